@@ -1,0 +1,42 @@
+//! The stated price of a sample (chapter 4): operations, which are 32-bit multiplications of values.
+
+/// Operations of a record of `count` coefficients at worst (4.2-2).
+///
+/// A coefficient dequantises (1), blends a light and a view column (6), multiplies both (1) and itself
+/// (1); each change of the spatial atom blends (2) and multiplies (2), x and y apart.
+pub const fn record_operations(count: u32, edge: u32) -> u64 {
+    let n = count as u64;
+    let atoms = (edge as u64) * (edge as u64);
+    let changes_x = if n < atoms { n } else { atoms };
+    let changes_y = if n < edge as u64 { n } else { edge as u64 };
+    9 * n + 4 * changes_x + 4 * changes_y + 8
+}
+
+/// Operations to locate a direction at worst (4.2-3): the grid, every candidate, then the whole hull.
+const fn locate_operations(candidates: u32, hull_count: u32) -> u64 {
+    2 + 6 * candidates as u64 + 12 * (hull_count as u64 + 1) + 4
+}
+
+/// What the cost of a sample depends on beside the records (4.2-1).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Shape {
+    /// Largest number of candidates in a cell of the light's and of the view's grid.
+    pub candidates: [u32; 2],
+    /// Hull edges of the light's and of the view's set.
+    pub hull_counts: [u32; 2],
+    /// Channels that are there.
+    pub means: u32,
+    /// Channels with scales.
+    pub scales: u32,
+}
+
+/// Operations of a filtered sample at worst (4.2-1), limited to 32 bits.
+///
+/// `records` is the largest sum, over the levels, of [`record_operations`] of every layer and channel.
+pub fn filtered_operations(shape: Shape, records: u64) -> u32 {
+    let [light, view] = [0, 1].map(|i| locate_operations(shape.candidates[i], shape.hull_counts[i]));
+    let axes = 18;
+    let colour = 48;
+    let sum = axes + light + view + 15 * shape.means as u64 + 17 * shape.scales as u64 + 4 * records + colour;
+    sum.min(u32::MAX as u64) as u32
+}

@@ -1,0 +1,323 @@
+//! Directions and their triangulation (chapter 5). Twin: `shaders/wgsl/direction.wgsl`.
+//!
+//! A direction is a point of the unit disc under the stereographic projection `x/(1+z), y/(1+z)`, in
+//! Q14, with its cosine in Q15. A sample set is located by a grid of candidate triangles with exact
+//! integer orientation tests; beyond the hull the point moves to the nearest place on it.
+
+use crate::fixed::{HALF_Q15, ONE_Q15, divide_q15, round_shift};
+use crate::words::{Words, word};
+
+/// One in Q14: the radius of the disc.
+pub const ONE_Q14: i32 = 16384;
+/// One in Q30.
+pub const ONE_Q30: i32 = 0x4000_0000;
+
+/// A direction of the upper hemisphere, or below it with a zero cosine.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(C)]
+pub struct Direction {
+    /// `x / (1 + z)`, in `-ONE_Q14 ..= ONE_Q14`.
+    pub x_q14: i32,
+    /// `y / (1 + z)`, in `-ONE_Q14 ..= ONE_Q14`.
+    pub y_q14: i32,
+    /// Cosine of the angle from the surface normal, in `0 ..= ONE_Q15`.
+    pub z_q15: i32,
+}
+
+/// Three sample directions of a set and their weights, which sum to `ONE_Q15` exactly.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(C)]
+pub struct Taps {
+    /// First direction.
+    pub a: u32,
+    /// Second direction.
+    pub b: u32,
+    /// Third direction.
+    pub c: u32,
+    /// Weight of the first.
+    pub weight_a_q15: i32,
+    /// Weight of the second.
+    pub weight_b_q15: i32,
+    /// Weight of the third.
+    pub weight_c_q15: i32,
+    /// Cosine asked for over cosine sampled: `ONE_Q15` within the hull, less beyond it.
+    pub cosine_q15: i32,
+}
+
+/// `|value|` as Q30 with its sign, from binary32 bits; magnitudes of one and more, infinities and NaN give one (5.2-1).
+pub fn binary32_to_q30(bits: u32) -> i32 {
+    let exponent = (bits >> 23) & 0xff;
+    let mantissa = (bits & 0x7f_ffff) | 0x80_0000;
+    // 5.2-1: a value below one has an exponent field of at most 126; it is mantissa * 2^(exponent - 150).
+    let shift = 126u32.wrapping_sub(exponent);
+    let mut magnitude = ONE_Q30;
+    if exponent < 127 {
+        magnitude = if shift < 31 { round_shift((mantissa << 6) as i32, shift) } else { 0 };
+    }
+    if (bits >> 31) != 0 {
+        return magnitude.wrapping_neg();
+    }
+    magnitude
+}
+
+/// `round(|n| / d * 2^14)` with the sign of `n`, for `|n| <= d` (5.2-2).
+pub fn project_q14(n: i32, d: u32) -> i32 {
+    // 5.2-2: one more bit than needed, then halves up.
+    let magnitude = (divide_q15(n.unsigned_abs(), d).wrapping_add(1) >> 1) as i32;
+    if n < 0 {
+        return magnitude.wrapping_neg();
+    }
+    magnitude
+}
+
+/// The direction of a unit vector given as three binary32 bit patterns (5.2-3).
+pub fn direction_from_binary32(x_bits: u32, y_bits: u32, z_bits: u32) -> Direction {
+    let x_q30 = binary32_to_q30(x_bits);
+    let y_q30 = binary32_to_q30(y_bits);
+    // 5.2-3: below the horizon the point is that of the horizon and the cosine is zero.
+    let z_q30 = binary32_to_q30(z_bits).max(0);
+    let d = (ONE_Q30 as u32).wrapping_add(z_q30 as u32);
+    Direction { x_q14: project_q14(x_q30, d), y_q14: project_q14(y_q30, d), z_q15: round_shift(z_q30, 15) }
+}
+
+/// The direction with every part within its range (5.1-2).
+pub fn clamp_direction(direction: Direction) -> Direction {
+    // 5.1-2: what lies outside the ranges is moved to their ends.
+    Direction {
+        x_q14: direction.x_q14.min(ONE_Q14).max(-ONE_Q14),
+        y_q14: direction.y_q14.min(ONE_Q14).max(-ONE_Q14),
+        z_q15: direction.z_q15.min(ONE_Q15).max(0),
+    }
+}
+
+/// One sample direction alone (5.1-3).
+pub fn single_tap(index: u32) -> Taps {
+    // 5.1-3: the other two weights are zero.
+    Taps { a: index, b: index, c: index, weight_a_q15: ONE_Q15, weight_b_q15: 0, weight_c_q15: 0, cosine_q15: ONE_Q15 }
+}
+
+/// First word of the sample directions of the set at `start` (5.3).
+pub fn points_start(start: u32) -> u32 {
+    start.wrapping_add(8)
+}
+
+/// First word of the triangles (5.3).
+pub fn triangles_start(words: Words<'_>, start: u32) -> u32 {
+    points_start(start).wrapping_add(word(words, start).wrapping_mul(2))
+}
+
+/// First word of the hull (5.3).
+pub fn hull_start(words: Words<'_>, start: u32) -> u32 {
+    triangles_start(words, start).wrapping_add(word(words, start.wrapping_add(1)).wrapping_mul(3))
+}
+
+/// First word of the grid (5.3).
+pub fn grid_start(words: Words<'_>, start: u32) -> u32 {
+    hull_start(words, start).wrapping_add(word(words, start.wrapping_add(2)).wrapping_mul(2))
+}
+
+/// x of sample direction `index`, Q14 (5.3-3).
+pub fn point_x_q14(words: Words<'_>, start: u32, index: u32) -> i32 {
+    ((word(words, points_start(start).wrapping_add(index.wrapping_mul(2))) << 16) as i32) >> 16
+}
+
+/// y of sample direction `index`, Q14 (5.3-3).
+pub fn point_y_q14(words: Words<'_>, start: u32, index: u32) -> i32 {
+    (word(words, points_start(start).wrapping_add(index.wrapping_mul(2))) as i32) >> 16
+}
+
+/// Cosine of sample direction `index`, Q15 (5.3-4).
+pub fn point_z_q15(words: Words<'_>, start: u32, index: u32) -> i32 {
+    word(words, points_start(start).wrapping_add(index.wrapping_mul(2)).wrapping_add(1)) as i32
+}
+
+/// Twice the signed area of the triangle `a`, `b`, `p`: positive if `p` is left of `a` to `b` (5.4-1).
+///
+/// Each difference is at most 2^15 and each product at most 2^30, so nothing overflows.
+pub fn cross(ax: i32, ay: i32, bx: i32, by: i32, px: i32, py: i32) -> i32 {
+    // 5.4-1: exact.
+    let first = bx.wrapping_sub(ax).wrapping_mul(py.wrapping_sub(ay));
+    let second = by.wrapping_sub(ay).wrapping_mul(px.wrapping_sub(ax));
+    first.wrapping_sub(second)
+}
+
+/// `part / whole` in Q15 by the stored reciprocal of the whole, halves up, at most `limit` (5.4-2).
+pub fn ratio_q15(part: i32, shift: u32, reciprocal: u32, limit: i32) -> i32 {
+    // 5.4-2: part >> shift has 16 bits or fewer and the product at most 2^31.
+    let ratio = ((part as u32) >> shift).wrapping_mul(reciprocal).wrapping_add(HALF_Q15 as u32 * 2) >> 16;
+    (ratio as i32).min(limit)
+}
+
+/// The cell of the grid along one axis (5.5-1).
+pub fn grid_cell(q14: i32, grid_size: u32) -> u32 {
+    // 5.5-1: the last cell is closed.
+    let cell = (q14.wrapping_add(ONE_Q14) as u32).wrapping_mul(grid_size) >> 15;
+    cell.min(grid_size.wrapping_sub(1))
+}
+
+/// The taps of a direction in the set at `start` (5.6).
+pub fn locate(words: Words<'_>, start: u32, asked: Direction) -> Taps {
+    let direction = clamp_direction(asked);
+    let px = direction.x_q14;
+    let py = direction.y_q14;
+    let triangles = triangles_start(words, start);
+    let grid = grid_start(words, start);
+    let grid_size = word(words, start.wrapping_add(3));
+    let cell = grid_cell(py, grid_size).wrapping_mul(grid_size).wrapping_add(grid_cell(px, grid_size));
+    let candidates = grid.wrapping_add(grid_size.wrapping_mul(grid_size)).wrapping_add(1);
+    let last = word(words, grid.wrapping_add(cell).wrapping_add(1));
+    let mut candidate = word(words, grid.wrapping_add(cell));
+    // 5.6-1: the first candidate that has the point inside or on its border.
+    while candidate < last {
+        let triangle = triangles.wrapping_add(word(words, candidates.wrapping_add(candidate)).wrapping_mul(3));
+        let first = word(words, triangle);
+        let second = word(words, triangle.wrapping_add(1));
+        let a = first & 0xffff;
+        let b = first >> 16;
+        let c = second & 0xffff;
+        let ax = point_x_q14(words, start, a);
+        let ay = point_y_q14(words, start, a);
+        let bx = point_x_q14(words, start, b);
+        let by = point_y_q14(words, start, b);
+        let cx = point_x_q14(words, start, c);
+        let cy = point_y_q14(words, start, c);
+        let area_a = cross(bx, by, cx, cy, px, py);
+        let area_b = cross(cx, cy, ax, ay, px, py);
+        let area_c = cross(ax, ay, bx, by, px, py);
+        if area_a >= 0 && area_b >= 0 && area_c >= 0 {
+            // 5.6-2: two weights by reciprocal, the last is what is left.
+            let shift = second >> 16;
+            let reciprocal = word(words, triangle.wrapping_add(2));
+            let weight_a = ratio_q15(area_a, shift, reciprocal, ONE_Q15);
+            let weight_b = ratio_q15(area_b, shift, reciprocal, ONE_Q15.wrapping_sub(weight_a));
+            let weight_c = ONE_Q15.wrapping_sub(weight_a).wrapping_sub(weight_b);
+            return Taps { a, b, c, weight_a_q15: weight_a, weight_b_q15: weight_b, weight_c_q15: weight_c, cosine_q15: ONE_Q15 };
+        }
+        candidate = candidate.wrapping_add(1);
+    }
+    locate_on_hull(words, start, direction)
+}
+
+/// The taps of the place on the hull nearest to a point that no triangle holds (5.7).
+pub fn locate_on_hull(words: Words<'_>, start: u32, direction: Direction) -> Taps {
+    let px = direction.x_q14;
+    let py = direction.y_q14;
+    let hull = hull_start(words, start);
+    let hull_count = word(words, start.wrapping_add(2));
+    let mut corner = 0u32;
+    let mut past_previous = false;
+    let mut edge = 0u32;
+    // 5.7-1: the last edge is looked at first, so that the first knows what precedes it.
+    if hull_count > 0 {
+        past_previous = hull_edge_position(words, start, hull_count.wrapping_sub(1), px, py) == 2;
+    }
+    while edge < hull_count {
+        let first = word(words, hull.wrapping_add(edge.wrapping_mul(2)));
+        let a = first & 0xffff;
+        let next = if edge.wrapping_add(1) < hull_count { edge.wrapping_add(1) } else { 0 };
+        let b = word(words, hull.wrapping_add(next.wrapping_mul(2))) & 0xffff;
+        let ax = point_x_q14(words, start, a);
+        let ay = point_y_q14(words, start, a);
+        let bx = point_x_q14(words, start, b);
+        let by = point_y_q14(words, start, b);
+        let position = hull_edge_position(words, start, edge, px, py);
+        // 5.7-2: the foot of the perpendicular lies on this edge and the point is not inside of it.
+        if position == 1 && cross(ax, ay, bx, by, px, py) <= 0 {
+            let along = dot(ax, ay, bx, by, px, py);
+            let reciprocal = word(words, hull.wrapping_add(edge.wrapping_mul(2)).wrapping_add(1));
+            let weight_b = ratio_q15(along, first >> 16, reciprocal, ONE_Q15);
+            return beyond_hull(words, start, direction, a, b, weight_b);
+        }
+        // 5.7-3: between two edges: past the end of the one, before the begin of the other.
+        if past_previous && position == 0 {
+            corner = edge;
+        }
+        past_previous = position == 2;
+        edge = edge.wrapping_add(1);
+    }
+    let at = word(words, hull.wrapping_add(corner.wrapping_mul(2))) & 0xffff;
+    // 5.7-4: a set of one direction has no hull.
+    let only = if hull_count > 0 { at } else { 0 };
+    beyond_hull(words, start, direction, only, only, 0)
+}
+
+/// Dot product of `a` to `b` with `a` to `p` (5.7-1).
+///
+/// At most |b-a| |p-a| <= 2^15 * 39,555 < 2^31, and each product at most 2^30.
+pub fn dot(ax: i32, ay: i32, bx: i32, by: i32, px: i32, py: i32) -> i32 {
+    // 5.7-1: exact.
+    let first = bx.wrapping_sub(ax).wrapping_mul(px.wrapping_sub(ax));
+    let second = by.wrapping_sub(ay).wrapping_mul(py.wrapping_sub(ay));
+    first.wrapping_add(second)
+}
+
+/// 0 if the foot of the perpendicular from the point lies before hull edge `edge`, 1 on it, 2 past it (5.7-1).
+///
+/// Both ends count as on it, except that a foot at the begin belongs to the edge before as well.
+pub fn hull_edge_position(words: Words<'_>, start: u32, edge: u32, px: i32, py: i32) -> u32 {
+    let hull = hull_start(words, start);
+    let hull_count = word(words, start.wrapping_add(2));
+    let next = if edge.wrapping_add(1) < hull_count { edge.wrapping_add(1) } else { 0 };
+    let a = word(words, hull.wrapping_add(edge.wrapping_mul(2))) & 0xffff;
+    let b = word(words, hull.wrapping_add(next.wrapping_mul(2))) & 0xffff;
+    let ax = point_x_q14(words, start, a);
+    let ay = point_y_q14(words, start, a);
+    let bx = point_x_q14(words, start, b);
+    let by = point_y_q14(words, start, b);
+    // 5.7-1: measured from both ends, so that no squared length is needed.
+    if dot(ax, ay, bx, by, px, py) < 0 {
+        return 0;
+    }
+    if dot(bx, by, ax, ay, px, py) < 0 {
+        return 2;
+    }
+    1
+}
+
+/// Two directions of the hull, and the cosine beyond it (5.7-5).
+pub fn beyond_hull(words: Words<'_>, start: u32, direction: Direction, a: u32, b: u32, weight_b: i32) -> Taps {
+    let weight_a = ONE_Q15.wrapping_sub(weight_b);
+    let za = point_z_q15(words, start, a).wrapping_mul(weight_a);
+    let zb = point_z_q15(words, start, b).wrapping_mul(weight_b);
+    // 5.7-5: z over the clamped z, and one where the clamped z is not larger.
+    let sampled = za.wrapping_add(zb).wrapping_add(HALF_Q15) >> 15;
+    let mut cosine = ONE_Q15;
+    if direction.z_q15 < sampled {
+        cosine = divide_q15(direction.z_q15 as u32, sampled as u32) as i32;
+    }
+    Taps { a, b, c: a, weight_a_q15: weight_a, weight_b_q15: weight_b, weight_c_q15: 0, cosine_q15: cosine }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn binary32_becomes_q30() {
+        let mut state = 1u32;
+        for i in 0..200_000u32 {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let value = if i % 2 == 0 { f32::from_bits(state) } else { (state as i32) as f32 / 2_147_483_648.0 };
+            let got = binary32_to_q30(value.to_bits());
+            let exact = if value.is_nan() { if value.is_sign_negative() { -1.0 } else { 1.0 } } else { (value as f64).clamp(-1.0, 1.0) };
+            let want = (exact.abs() * ONE_Q30 as f64 + 0.5).floor().copysign(exact);
+            assert_eq!(got as f64, want, "{value}");
+        }
+    }
+
+    #[test]
+    fn vectors_are_projected() {
+        for (vector, want) in [
+            ([0.0f32, 0.0, 1.0], (0, 0, ONE_Q15)),
+            ([1.0, 0.0, 0.0], (ONE_Q14, 0, 0)),
+            ([0.0, -1.0, 0.0], (0, -ONE_Q14, 0)),
+            ([0.6, 0.0, 0.8], (5461, 0, 26214)),
+            ([0.6, 0.0, -0.8], (9830, 0, 0)),
+            ([f32::NAN, f32::INFINITY, f32::NEG_INFINITY], (ONE_Q14, ONE_Q14, 0)),
+        ] {
+            let [x, y, z] = vector.map(f32::to_bits);
+            let got = direction_from_binary32(x, y, z);
+            assert_eq!((got.x_q14, got.y_q14, got.z_q15), want, "{vector:?}");
+        }
+    }
+}

@@ -1,0 +1,275 @@
+//! Checks of the sparse ensemble's sections (chapter 10).
+
+use crate::check::{Check, Section};
+use crate::ensemble::{LOW_BITS_BITS, SHIFT_BIAS, SHIFT_BITS};
+use crate::error::Rule;
+use crate::header::Header;
+use crate::material::level_size;
+use crate::words::{Words, word};
+
+/// Most dictionaries of an ensemble (10.1-2).
+pub const DICTIONARY_LIMIT: u32 = 256;
+/// Most columns of an angular factor (10.1-2).
+pub const ANGULAR_COLUMN_LIMIT: u32 = 1024;
+/// Most atoms of a dictionary (10.5-4).
+pub const ATOM_LIMIT: u32 = 65_536;
+/// Largest sum of the shifted magnitudes of a record (10.7-7).
+pub const SUM_LIMIT: u32 = 65_535;
+/// Most low bits of a position (10.4-7).
+pub const LOW_BITS_LIMIT: u32 = 12;
+
+/// A section of factors that was checked, in either file.
+#[derive(Clone, Copy)]
+pub(crate) struct Factors {
+    /// Its first word, as the kernel counts.
+    pub start: u32,
+    /// Dictionaries.
+    pub count: u32,
+}
+
+/// Columns of the two tables of dictionary `k` of a section of factors.
+pub(crate) fn columns(words: Words<'_>, start: u32, k: u32) -> (u32, u32) {
+    let at = start + 2 + k * 4;
+    (word(words, at), word(words, at + 1))
+}
+
+/// Walks 10.1 for the angular factors (`first_rows` lights, `second_rows` views) or 10.2 for the spatial.
+pub(crate) fn check_factors(check: &mut Check<'_, '_>, section: Section, first_rows: u32, second_rows: u32, limit: u32) -> Option<Factors> {
+    let offset = section.offset;
+    if !check.ensure(section.length >= 8, Rule::FactorLength, offset, section.length) {
+        return None;
+    }
+    let count = check.word_at(offset);
+    let reserved = check.word_at(offset + 4);
+    let counted = (1..=DICTIONARY_LIMIT).contains(&count) && section.length >= 8 + count.min(DICTIONARY_LIMIT) * 16;
+    if !check.ensure(counted, Rule::FactorCounts, offset, count) {
+        return None;
+    }
+    check.ensure(reserved == 0, Rule::FactorCounts, offset + 4, reserved);
+    let factors = Factors { start: check.section_start(section), count };
+    let mut end = 8 + count as u64 * 16;
+    for k in 0..count {
+        let at = offset + 8 + k * 16;
+        let (first, second) = columns(check.words, factors.start, k);
+        for (n, found) in [(0, first), (4, second)] {
+            if !check.ensure((1..=limit).contains(&found), Rule::FactorCounts, at + n, found) {
+                return None;
+            }
+        }
+        for (n, rows, columns) in [(8, first_rows, first), (12, second_rows, second)] {
+            let stated = check.word_at(at + n);
+            if !check.ensure(stated as u64 * 4 == end, Rule::FactorOffset, at + n, stated) {
+                return None;
+            }
+            end += rows as u64 * columns.div_ceil(2) as u64 * 4;
+        }
+    }
+    if !check.ensure(section.length as u64 == end, Rule::FactorLength, offset, section.length) {
+        return None;
+    }
+    for k in 0..count {
+        let (first, second) = columns(check.words, factors.start, k);
+        for (n, rows, columns) in [(8, first_rows, first), (12, second_rows, second)] {
+            let table = check.word_at(offset + 8 + k * 16 + n);
+            check.packed_rows(Rule::FactorEntry, offset + table * 4, rows, columns);
+            if check.stopped {
+                return None;
+            }
+        }
+    }
+    Some(factors)
+}
+
+/// Walks 10.5. `false` if the records cannot be held against it.
+pub(crate) fn check_atoms(check: &mut Check<'_, '_>, section: Section, angular: Factors, spatial: Factors) -> bool {
+    let count = angular.count;
+    let offset = section.offset;
+    let head = 8 + count * 8;
+    if !check.ensure(section.length >= head, Rule::AtomsLength, offset, section.length) {
+        return false;
+    }
+    let stated = check.word_at(offset);
+    let reserved = check.word_at(offset + 4);
+    let mut sound = check.ensure(stated == count, Rule::AtomsCounts, offset, stated);
+    check.ensure(reserved == 0, Rule::AtomsCounts, offset + 4, reserved);
+    let mut end = head as u64;
+    for k in 0..count {
+        let at = offset + 8 + k * 8;
+        let (atoms, start) = (check.word_at(at), check.word_at(at + 4));
+        let holds = atoms <= ATOM_LIMIT && start as u64 * 4 == end;
+        sound &= check.ensure(holds, Rule::AtomsCounts, at, atoms);
+        end += atoms.min(ATOM_LIMIT) as u64 * 8;
+    }
+    sound &= check.ensure(section.length as u64 == end, Rule::AtomsLength, offset, section.length);
+    if !sound {
+        return false;
+    }
+    for k in 0..count {
+        let (lights, views) = columns(check.words, angular.start, k);
+        let (xs, ys) = columns(check.words, spatial.start, k);
+        let (atoms, start) = (check.word_at(offset + 8 + k * 8), check.word_at(offset + 12 + k * 8));
+        let mut before = None;
+        for i in 0..atoms {
+            let at = offset + start * 4 + i * 8;
+            let (atom, quantiser) = (check.word_at(at), check.word_at(at + 4));
+            let named = (atom >> 4) & 0x3ff < views && (atom >> 14) & 0x3ff < lights && (atom >> 24) & 0xf < xs && atom >> 28 < ys;
+            sound &= check.ensure(named, Rule::AtomColumn, at, atom);
+            sound &= check.ensure(before.is_none_or(|before| before < atom >> 4), Rule::AtomOrder, at, atom);
+            before = Some(atom >> 4);
+            let base = ((quantiser << 16) as i32) >> 16;
+            let holds = base != -32768 && base + (quantiser >> 16) as i32 <= 32_767;
+            sound &= check.ensure(holds, Rule::AtomQuantiser, at + 4, quantiser);
+            if check.stopped {
+                return false;
+            }
+        }
+    }
+    sound
+}
+
+/// Up to 57 bits of a stream from `bit` on; zero beyond its end.
+#[inline(always)]
+fn window(stream: &[u8], bit: u32) -> u64 {
+    let from = (bit >> 3) as usize;
+    match stream.get(from..) {
+        Some([a, b, c, d, e, f, g, h, ..]) => u64::from_le_bytes([*a, *b, *c, *d, *e, *f, *g, *h]) >> (bit & 7),
+        Some(rest) => rest.iter().rev().fold(0u64, |bits, &byte| bits << 8 | byte as u64) >> (bit & 7),
+        None => 0,
+    }
+}
+
+/// What the records of a section are read by.
+struct Stream<'a> {
+    bytes: &'a [u8],
+    bits: u32,
+    value_bits: u32,
+    dictionary_bits: u32,
+    count_bits: u32,
+}
+
+/// Walks 10.3, 10.4 and 10.7-7; gives the largest count of a record.
+pub(crate) fn check_coefficients(check: &mut Check<'_, '_>, section: Section, header: &Header, level: u32, atoms: Section) -> Option<u32> {
+    let offset = section.offset;
+    if !check.ensure(section.length >= 16, Rule::CoefficientsLength, offset, section.length) {
+        return None;
+    }
+    let widths = check.word_at(offset);
+    let (value_bits, dictionary_bits, count_bits) = (widths & 0xff, (widths >> 8) & 0xff, widths >> 16);
+    let widths_good = (1..=16).contains(&value_bits) && dictionary_bits <= 8 && (1..=15).contains(&count_bits);
+    if !check.ensure(widths_good, Rule::CoefficientsHeader, offset, widths) {
+        return None;
+    }
+    let along = |size: u32| level_size(size, level).div_ceil(header.edge);
+    let blocks = along(header.width) * along(header.height);
+    let stated = check.word_at(offset + 4);
+    if !check.ensure(stated == blocks, Rule::CoefficientsHeader, offset + 4, stated) {
+        return None;
+    }
+    let bits = check.word_at(offset + 8);
+    let expected = 16 + blocks as u64 * 4 + bits.div_ceil(32) as u64 * 4;
+    if !check.ensure(section.length as u64 == expected, Rule::CoefficientsLength, offset, section.length) {
+        return None;
+    }
+    let stream_offset = offset + 16 + blocks * 4;
+    let bytes = check.bytes.get(stream_offset as usize..(offset + section.length) as usize).unwrap_or(&[]);
+    let table = check.bytes.get((offset + 16) as usize..stream_offset as usize).unwrap_or(&[]);
+    let stream = Stream { bytes, bits, value_bits, dictionary_bits, count_bits };
+    let mut end = 0u32;
+    let mut largest = 0;
+    for (block, entry) in (0u32..).zip(table.as_chunks::<4>().0) {
+        let bit = u32::from_le_bytes(*entry);
+        let at = offset + 16 + block * 4;
+        if !check.ensure(bit == end, Rule::RecordPlace, at, bit) {
+            return None;
+        }
+        let (next, count) = check_record(check, &stream, bit, stream_offset, atoms)?;
+        end = next;
+        largest = largest.max(count);
+    }
+    if !check.ensure(end == bits, Rule::RecordPlace, offset + 8, bits) {
+        return None;
+    }
+    // Fewer than 32 bits are left, all in the last word.
+    let rest = if bits % 32 == 0 { 0 } else { window(bytes, bits) as u32 & (u32::MAX >> (bits % 32)) };
+    check.ensure(rest == 0, Rule::StreamEnd, offset + section.length - 4, rest);
+    let stated = check.word_at(offset + 12);
+    check.ensure(stated == largest, Rule::LargestCount, offset + 12, stated);
+    Some(largest)
+}
+
+/// One record: its end and count, or nothing if what follows cannot be found.
+#[inline]
+fn check_record(check: &mut Check<'_, '_>, stream: &Stream<'_>, bit: u32, stream_offset: u32, atoms: Section) -> Option<(u32, u32)> {
+    let at = stream_offset + (bit >> 5) * 4;
+    let head = window(stream.bytes, bit);
+    let mask = |bits: u32| (1u64 << bits) - 1;
+    let count = (head & mask(stream.count_bits)) as u32;
+    let dictionary = (head >> stream.count_bits & mask(stream.dictionary_bits)) as u32;
+    let after = stream.count_bits + stream.dictionary_bits;
+    let shift = (head >> after & mask(SHIFT_BITS)) as u32;
+    let low_bits = (head >> (after + SHIFT_BITS) & mask(LOW_BITS_BITS)) as u32;
+    let header_bits = after + SHIFT_BITS + LOW_BITS_BITS;
+    let field_bits = low_bits + stream.value_bits;
+    let fields = bit as u64 + header_bits as u64;
+    let highs = fields + count as u64 * field_bits as u64;
+    if !check.ensure(highs + count as u64 <= stream.bits as u64, Rule::RecordPlace, at, bit) {
+        return None;
+    }
+    if count == 0 {
+        check.ensure(dictionary | shift | low_bits == 0, Rule::RecordHeader, at, head as u32);
+        return Some((fields as u32, 0));
+    }
+    let dictionaries = check.word_at(atoms.offset);
+    let good = dictionary < dictionaries && shift <= 31 - SHIFT_BIAS && low_bits <= LOW_BITS_LIMIT;
+    if !check.ensure(good, Rule::RecordHeader, at, head as u32) {
+        return None;
+    }
+    let entry = atoms.offset + 8 + dictionary * 8;
+    let (atom_count, atom_start) = (check.word_at(entry), check.word_at(entry + 4));
+    let list = check.bytes.get((atoms.offset + atom_start * 4) as usize..).unwrap_or(&[]);
+    let list = list.as_chunks::<8>().0;
+    let list = list.get(..atom_count as usize).unwrap_or(&[]);
+
+    let (low_mask, value_mask) = (mask(low_bits) as u32, mask(stream.value_bits) as u32);
+    let half = (1u32 << stream.value_bits) >> 1;
+    let mut field_bit = fields as u32;
+    let mut base = highs as u32;
+    let mut sum = 0u32;
+    let mut ascends = true;
+    let mut next = 0u32;
+    let mut index = 0u32;
+    let mut end = base;
+    while index < count && base < stream.bits {
+        // 48 bits of the high parts at a time; each one bit is a coefficient.
+        let left = stream.bits - base;
+        let mut ones = window(stream.bytes, base) & mask(left.min(48));
+        while ones != 0 && index < count {
+            let place = base + ones.trailing_zeros();
+            ones &= ones - 1;
+            end = place + 1;
+            let high = place - highs as u32 - index;
+            let field = window(stream.bytes, field_bit) as u32;
+            field_bit += field_bits;
+            // A high part beyond all atoms must not wrap back to one.
+            let position = if high < ATOM_LIMIT { high << low_bits | field & low_mask } else { u32::MAX };
+            let Some(&[a, _, _, _, b0, b1, s0, s1]) = list.get(position as usize) else {
+                check.find(Rule::RecordPositions, at, position);
+                return None;
+            };
+            ascends &= position >= next;
+            next = position + 1;
+            let step = u16::from_le_bytes([s0, s1]) as u32;
+            let value = (field >> low_bits) & value_mask;
+            let coefficient = i16::from_le_bytes([b0, b1]) as i32 + ((value * step + half) >> stream.value_bits) as i32;
+            let atom_shift = a & 0xf;
+            sum += (coefficient.unsigned_abs() + (1 << atom_shift) - 1) >> atom_shift;
+            index += 1;
+        }
+        base += 48;
+    }
+    if !check.ensure(index == count, Rule::RecordPlace, at, bit) || !check.ensure(ascends, Rule::RecordPositions, at, bit) {
+        return None;
+    }
+    check.ensure(sum <= SUM_LIMIT, Rule::RecordSum, at, sum);
+    if check.stopped { None } else { Some((end, count)) }
+}

@@ -1,0 +1,90 @@
+//! What the kernel knows of an open material (chapter 1). Twin: `shaders/wgsl/material.wgsl`.
+//!
+//! `open` fills one of these from the header and the directory; every field is one 32-bit word, so the
+//! same record is a Rust struct, a WGSL struct and an entry of the host's table of materials.
+
+/// A channel that is not in the file: its value is zero.
+pub const CHANNEL_MISSING: u32 = 0;
+/// A channel that is a mean for every pair of directions, without texture.
+pub const CHANNEL_MEAN: u32 = 1;
+/// A channel with texture.
+pub const CHANNEL_FULL: u32 = 2;
+/// Channels are base-two logarithms of radiance plus an offset.
+pub const TRANSFER_LOG2: u32 = 0;
+/// Channels are linear.
+pub const TRANSFER_LINEAR: u32 = 1;
+
+/// Where the parts of one channel are. Offsets are word numbers; 0 for what a channel does not have.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(C)]
+pub struct Channel {
+    /// [`CHANNEL_MISSING`], [`CHANNEL_MEAN`] or [`CHANNEL_FULL`].
+    pub state: u32,
+    /// First word of the means.
+    pub mean_start: u32,
+    /// First word of the scales.
+    pub scale_start: u32,
+    /// Rank among the channels with texture.
+    pub full_rank: u32,
+    /// First word of the angular factors.
+    pub angular_start: u32,
+    /// First word of the spatial factors.
+    pub spatial_start: u32,
+    /// First word of the table of atoms.
+    pub atoms_start: u32,
+}
+
+/// Everything that decoding needs beside the words of the file. Offsets are word numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(C)]
+pub struct Material {
+    /// First word of the file.
+    pub file_start: u32,
+    /// Texels along x at level 0.
+    pub width: u32,
+    /// Texels along y at level 0.
+    pub height: u32,
+    /// Levels of detail, 1 for the full resolution alone.
+    pub level_count: u32,
+    /// Directions of the light.
+    pub light_count: u32,
+    /// Directions of the view.
+    pub view_count: u32,
+    /// First word of the section of light directions.
+    pub light_start: u32,
+    /// First word of the section of view directions.
+    pub view_start: u32,
+    /// [`TRANSFER_LOG2`] or [`TRANSFER_LINEAR`].
+    pub transfer: u32,
+    /// 1 if the light's cosine is in the values.
+    pub cosine_included: u32,
+    /// Q31 mantissa of the log offset, 0 for none.
+    pub offset_mantissa_q31: u32,
+    /// Exponent of the log offset, or of the linear values.
+    pub exponent: i32,
+    /// Colour matrix, row by row: red, green, blue from channels 0, 1, 2.
+    pub matrix_q13: [i32; 9],
+    /// Texels along the side of a block.
+    pub edge: u32,
+    /// `ceil(2^18 / edge)`.
+    pub edge_reciprocal_q18: u32,
+    /// Quality layers in the file.
+    pub layer_count: u32,
+    /// Quality layers to decode.
+    pub layer_limit: u32,
+    /// Channels with texture.
+    pub full_count: u32,
+    /// Word number of the first directory entry of the coefficients.
+    pub coefficient_entry: u32,
+    /// The three channels.
+    pub channels: [Channel; 3],
+}
+
+/// Words in a [`Material`].
+pub const MATERIAL_WORDS: usize = 48;
+
+/// Texels along an axis of `size` texels at `level`, halves rounded up (9.1-1).
+pub fn level_size(size: u32, level: u32) -> u32 {
+    // 9.1-1: never zero, since sizes are at least one.
+    size.wrapping_add((1u32 << level).wrapping_sub(1)) >> level
+}

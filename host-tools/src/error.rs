@@ -1,0 +1,82 @@
+//! What can go wrong on the host, and the exit code that each kind has.
+
+use std::path::{Path, PathBuf};
+
+/// Any failure of a tool.
+#[derive(Debug, thiserror::Error)]
+pub enum ToolError {
+    /// The command line does not make sense.
+    #[error("{0}")]
+    Usage(String),
+    /// Reading or writing failed.
+    #[error("{path}: {source}")]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A Selvedge file breaks a rule.
+    #[error("{path}: {finding}")]
+    Invalid {
+        /// The file.
+        path: PathBuf,
+        /// The first broken rule.
+        finding: selvedge::Finding,
+    },
+    /// A foreign file is not what its layout says.
+    #[error("{path}, byte {offset}: {what}")]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+        /// Byte offset.
+        offset: u64,
+        /// What is wrong there.
+        what: String,
+    },
+    /// A picture could not be encoded.
+    #[error("{path}: {what}")]
+    Picture {
+        /// The file.
+        path: PathBuf,
+        /// What the library said.
+        what: String,
+    },
+    /// The kernel could not be translated or run.
+    #[error("kernel: {0}")]
+    Kernel(String),
+    /// A check that the tool makes of its own results failed.
+    #[error("{0}")]
+    Mismatch(String),
+}
+
+impl ToolError {
+    /// From an I/O error at a path.
+    pub fn io(path: &Path) -> impl FnOnce(std::io::Error) -> ToolError + '_ {
+        move |source| ToolError::Io { path: path.to_owned(), source }
+    }
+
+    /// The program's exit code: 1 usage, 2 I/O, 3 invalid, 4 over limits, 5 unsupported.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            ToolError::Usage(_) => 1,
+            ToolError::Io { .. } | ToolError::Picture { .. } => 2,
+            ToolError::Foreign { .. } | ToolError::Mismatch(_) => 3,
+            ToolError::Kernel(_) => 5,
+            ToolError::Invalid { finding, .. } => exit_code_of(finding.rule),
+        }
+    }
+}
+
+/// The exit code of a broken rule.
+pub fn exit_code_of(rule: selvedge::Rule) -> u8 {
+    match rule.family() {
+        selvedge::Family::Invalid => 3,
+        selvedge::Family::Unsupported => 5,
+        selvedge::Family::Limits => 4,
+        selvedge::Family::Usage => 1,
+    }
+}
+
+/// Results of tools.
+pub type Result<T> = std::result::Result<T, ToolError>;

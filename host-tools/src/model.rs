@@ -1,0 +1,187 @@
+//! A material in memory, quantised: exactly what a file holds, before layout, checksums and cost.
+//!
+//! Whoever makes a file (an importer, an encoder, a generator of test files) fills a [`MaterialModel`];
+//! [`crate::write`] turns it into bytes. All numbers have the meaning of the specification.
+
+/// A whole material.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MaterialModel {
+    /// Texels along x and y.
+    pub size: [u32; 2],
+    /// Levels of detail.
+    pub level_count: u32,
+    /// Texels along the side of a block.
+    pub edge: u32,
+    /// Quality layers.
+    pub layer_count: u32,
+    /// How channel values become radiance.
+    pub transfer: TransferModel,
+    /// The light's cosine is in the values.
+    pub cosine_included: bool,
+    /// Rows give red, green, blue; Q13.
+    pub matrix_q13: [i16; 9],
+    /// Texts and units.
+    pub metadata: MetadataModel,
+    /// Light directions: points of the disc, Q14.
+    pub lights: Vec<[i32; 2]>,
+    /// View directions; `None` if they are those of the light.
+    pub views: Option<Vec<[i32; 2]>>,
+    /// The channels.
+    pub channels: [ChannelModel; 3],
+    /// Optional sections of unknown kinds: kind, instance, bytes (a multiple of four).
+    pub extras: Vec<(u16, u16, Vec<u8>)>,
+}
+
+impl MaterialModel {
+    /// View directions, whether or not they are stored apart.
+    pub fn views(&self) -> &[[i32; 2]] {
+        self.views.as_deref().unwrap_or(&self.lights)
+    }
+}
+
+/// Chapter 7.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum TransferModel {
+    /// Base-two logarithm of radiance plus an offset.
+    Log2 {
+        /// The offset.
+        offset: f32,
+    },
+    /// Linear values times a power of two.
+    Linear {
+        /// The power.
+        exponent: i32,
+    },
+}
+
+/// Chapter 3.4.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MetadataModel {
+    /// Width and height of a texel in nanometres, 0 if unknown.
+    pub texel_nm: [u32; 2],
+    /// Axes of the directions.
+    pub frame: u32,
+    /// Where texel (0, 0) is.
+    pub image_origin: u32,
+    /// Primaries.
+    pub primaries: u32,
+    /// Name, origin of the data, licence.
+    pub texts: [String; 3],
+}
+
+/// One channel; which parts are there says whether it is missing, a mean, or full.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ChannelModel {
+    /// Means for pairs of directions.
+    pub mean: Option<PairTableModel>,
+    /// Scales for pairs of directions.
+    pub scale: Option<PairTableModel>,
+    /// Texture.
+    pub ensemble: Option<EnsembleModel>,
+}
+
+impl ChannelModel {
+    /// The state in the header.
+    pub fn state(&self) -> u32 {
+        match (&self.mean, &self.ensemble) {
+            (_, Some(_)) => 2,
+            (Some(_), None) => 1,
+            (None, None) => 0,
+        }
+    }
+}
+
+/// Chapters 8.1 and 8.2.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PairTableModel {
+    /// Added to every entry, Q20.
+    pub base_q20: i32,
+    /// Left shift of the entries.
+    pub shift: u32,
+    /// `entries[view * light_count + light]`.
+    pub entries: Vec<i16>,
+}
+
+/// `rows` x `columns` numbers in Q15, row by row.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FactorModel {
+    /// Columns.
+    pub columns: u32,
+    /// Entries.
+    pub entries: Vec<i16>,
+}
+
+/// One dictionary: four factors.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DictionaryModel {
+    /// Rows are light directions.
+    pub light: FactorModel,
+    /// Rows are view directions.
+    pub view: FactorModel,
+    /// Rows are texels of a block along x.
+    pub x: FactorModel,
+    /// Rows are texels of a block along y.
+    pub y: FactorModel,
+}
+
+/// An atom: a column of each factor, and how its values are quantised.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AtomModel {
+    /// Column of the light factor.
+    pub light: u32,
+    /// Column of the view factor.
+    pub view: u32,
+    /// Column of the x factor.
+    pub x: u32,
+    /// Column of the y factor.
+    pub y: u32,
+    /// Right shift of its products.
+    pub shift: u32,
+    /// Coefficient of value 0.
+    pub base: i16,
+    /// Coefficients over the whole range of values.
+    pub step: u16,
+}
+
+impl AtomModel {
+    /// The atom's word in the file.
+    pub fn word(&self) -> u32 {
+        self.y << 28 | self.x << 24 | self.light << 14 | self.view << 4 | self.shift
+    }
+
+    /// Base and step in one word.
+    pub fn quantiser(&self) -> u32 {
+        self.base as u16 as u32 | (self.step as u32) << 16
+    }
+}
+
+/// The texture of a channel.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct EnsembleModel {
+    /// The ensemble.
+    pub dictionaries: Vec<DictionaryModel>,
+    /// Atoms of each dictionary, ascending by [`AtomModel::word`].
+    pub atoms: Vec<Vec<AtomModel>>,
+    /// `coefficients[level][layer]`.
+    pub coefficients: Vec<Vec<CoefficientsModel>>,
+}
+
+/// The records of one level and layer.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CoefficientsModel {
+    /// Bits of a value.
+    pub value_bits: u32,
+    /// Block by block, row by row.
+    pub records: Vec<RecordModel>,
+}
+
+/// The record of one block.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RecordModel {
+    /// Which dictionary.
+    pub dictionary: u32,
+    /// Right shift of the result, 5 to 31.
+    pub shift: u32,
+    /// Positions in the list of atoms, ascending, with their values.
+    pub coefficients: Vec<(u32, u16)>,
+}

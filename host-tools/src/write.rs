@@ -1,0 +1,316 @@
+//! The writer: a model becomes the bytes of a file, laid out by chapter 3. One model gives one file.
+
+use crate::model::{CoefficientsModel, EnsembleModel, FactorModel, MaterialModel, MetadataModel, PairTableModel, TransferModel};
+use crate::triangulate::{Triangulation, triangulate};
+use selvedge::cost::{Shape, filtered_operations, record_operations};
+use selvedge::direction_set::{cosine_of, reciprocal_of};
+use selvedge::directory::{ANGULAR, ATOMS, COEFFICIENTS, DIRECTIONS, EXTERNAL, MEANS, METADATA, SCALES, SPATIAL};
+use selvedge::ensemble::{LOW_BITS_BITS, SHIFT_BIAS, SHIFT_BITS};
+use selvedge::ensemble_set::LOW_BITS_LIMIT;
+use selvedge::header::{CONTENT_DICTIONARY, CONTENT_MATERIAL, HEADER_LENGTH, MAGIC, METHOD_SPARSE_ENSEMBLE};
+use selvedge::{crc32, sha256};
+
+/// A section before layout.
+struct Part {
+    kind: u32,
+    instance: u32,
+    bytes: Vec<u8>,
+}
+
+fn words_to_bytes(words: &[u32]) -> Vec<u8> {
+    words.iter().flat_map(|word| word.to_le_bytes()).collect()
+}
+
+/// 16-bit numbers two to a word, each row padded to a word.
+fn pack_rows(words: &mut Vec<u32>, entries: &[i16], columns: u32) {
+    for row in entries.chunks(columns.max(1) as usize) {
+        words.extend(row.chunks(2).map(|pair| pair[0] as u16 as u32 | (pair.get(1).copied().unwrap_or(0) as u16 as u32) << 16));
+    }
+}
+
+/// A file that holds a material with its own dictionary.
+pub fn write_material(model: &MaterialModel) -> Vec<u8> {
+    material_file(model, None)
+}
+
+/// A dictionary file and the material that names it.
+pub fn write_split(model: &MaterialModel) -> (Vec<u8>, Vec<u8>) {
+    let dictionary = dictionary_file(model);
+    (material_file(model, Some(&dictionary)), dictionary)
+}
+
+fn material_file(model: &MaterialModel, external: Option<&[u8]>) -> Vec<u8> {
+    let mut parts = vec![metadata_part(&model.metadata)];
+    if let Some(dictionary) = external {
+        let mut bytes = sha256(dictionary).to_vec();
+        bytes.extend(words_to_bytes(&[dictionary.len() as u32, 0, 0, 0]));
+        parts.push(Part { kind: EXTERNAL, instance: 0, bytes });
+    }
+    let light = triangulate(&model.lights, None);
+    parts.push(directions_part(0, &model.lights, &light));
+    let view = model.views.as_ref().map(|views| {
+        let view = triangulate(views, None);
+        parts.push(directions_part(1, views, &view));
+        view
+    });
+    let light_count = model.lights.len() as u32;
+    for (kind, table) in [(MEANS, 0), (SCALES, 1)] {
+        for (c, channel) in (0u32..).zip(&model.channels) {
+            let table = if table == 0 { &channel.mean } else { &channel.scale };
+            parts.extend(table.as_ref().map(|table| pair_table_part(kind, c, table, light_count)));
+        }
+    }
+    let ensembles: Vec<(u32, &EnsembleModel)> = (0u32..).zip(&model.channels).filter_map(|(c, channel)| Some((c, channel.ensemble.as_ref()?))).collect();
+    if external.is_none() {
+        parts.extend(factor_parts(&ensembles));
+    }
+    parts.extend(ensembles.iter().map(|&(c, ensemble)| atoms_part(c, ensemble)));
+    let mut records = 0;
+    for level in 0..model.level_count {
+        let mut at_level = 0;
+        for layer in 0..model.layer_count {
+            for &(c, ensemble) in &ensembles {
+                let coefficients = &ensemble.coefficients[level as usize][layer as usize];
+                let largest = coefficients.records.iter().map(|record| record.coefficients.len()).max().unwrap_or(0) as u32;
+                at_level += record_operations(largest, model.edge);
+                let bytes = coefficients_bytes(coefficients, ensemble.dictionaries.len() as u32, largest);
+                parts.push(Part { kind: COEFFICIENTS, instance: level << 8 | layer << 4 | c, bytes });
+            }
+        }
+        records = records.max(at_level);
+    }
+    parts.extend(model.extras.iter().map(|(kind, instance, bytes)| Part { kind: *kind as u32, instance: *instance as u32, bytes: bytes.clone() }));
+
+    let view = view.as_ref().unwrap_or(&light);
+    let states = [0, 1, 2].map(|c| model.channels[c].state());
+    let shape = Shape {
+        candidates: [light.largest_cell(), view.largest_cell()],
+        hull_counts: [light.hull.len() as u32, view.hull.len() as u32],
+        means: states.iter().filter(|&&state| state > 0).count() as u32,
+        scales: model.channels.iter().filter(|channel| channel.scale.is_some()).count() as u32,
+    };
+    let mut header = header_words(CONTENT_MATERIAL, model, states);
+    header[7] = filtered_operations(shape, records);
+    header[8] = model.size[0];
+    header[9] = model.size[1];
+    header[12] = model.level_count;
+    header[13] = model.edge | model.layer_count << 8;
+    let (transfer, parameter) = match model.transfer {
+        TransferModel::Log2 { offset } => (0, offset.to_bits()),
+        TransferModel::Linear { exponent } => (1, exponent as u32),
+    };
+    header[15] = transfer | (model.cosine_included as u32) << 8;
+    header[16] = parameter;
+    let mut matrix = Vec::new();
+    pack_rows(&mut matrix, &model.matrix_q13, 9);
+    header[17..22].copy_from_slice(&matrix);
+    lay_out(header, parts)
+}
+
+fn dictionary_file(model: &MaterialModel) -> Vec<u8> {
+    let mut parts = vec![metadata_part(&model.metadata)];
+    let ensembles: Vec<(u32, &EnsembleModel)> = (0u32..).zip(&model.channels).filter_map(|(c, channel)| Some((c, channel.ensemble.as_ref()?))).collect();
+    parts.extend(factor_parts(&ensembles));
+    let states = [0, 1, 2].map(|c| if model.channels[c].ensemble.is_some() { 2 } else { 0 });
+    let mut header = header_words(CONTENT_DICTIONARY, model, states);
+    header[8] = 1;
+    header[9] = 1;
+    header[12] = 1;
+    header[13] = model.edge | 1 << 8;
+    lay_out(header, parts)
+}
+
+/// What both contents state.
+fn header_words(content: u32, model: &MaterialModel, states: [u32; 3]) -> [u32; 32] {
+    let mut header = [0; 32];
+    header[2] = 1;
+    header[4] = content;
+    header[5] = METHOD_SPARSE_ENSEMBLE;
+    header[10] = model.lights.len() as u32;
+    header[11] = model.views().len() as u32;
+    header[14] = states[0] | states[1] << 8 | states[2] << 16;
+    header
+}
+
+/// Header, directory, sections and padding (3.1, 3.2).
+fn lay_out(mut header: [u32; 32], mut parts: Vec<Part>) -> Vec<u8> {
+    parts.sort_by_key(|part| (part.kind, part.instance));
+    let mut bytes = vec![0u8; HEADER_LENGTH as usize + parts.len() * 16];
+    for (i, part) in parts.iter().enumerate() {
+        bytes.resize(bytes.len().next_multiple_of(16), 0);
+        let entry = [part.kind | part.instance << 16, bytes.len() as u32, part.bytes.len() as u32, crc32(0, &part.bytes)];
+        let at = HEADER_LENGTH as usize + i * 16;
+        bytes[at..at + 16].copy_from_slice(&words_to_bytes(&entry));
+        bytes.extend(&part.bytes);
+    }
+    bytes.resize(bytes.len().next_multiple_of(16), 0);
+    header[3] = bytes.len() as u32;
+    header[6] = parts.len() as u32;
+    bytes[..128].copy_from_slice(&words_to_bytes(&header));
+    bytes[..8].copy_from_slice(&MAGIC);
+    repair_header_checksum(&mut bytes);
+    bytes
+}
+
+/// Writes the header's checksum anew (3.1-6).
+pub fn repair_header_checksum(bytes: &mut [u8]) {
+    let count = u32::from_le_bytes([bytes[24], bytes[25], bytes[26], bytes[27]]) as usize;
+    let end = (128 + count.min(4096) * 16).min(bytes.len());
+    let sum = crc32(crc32(0, &bytes[..124]), &bytes[128..end]);
+    bytes[124..128].copy_from_slice(&sum.to_le_bytes());
+}
+
+/// Writes every checksum anew, as far as the directory can be followed; for tests that damage files.
+pub fn repair_checksums(bytes: &mut [u8]) {
+    if bytes.len() < 128 {
+        return;
+    }
+    let word = |bytes: &[u8], at: usize| bytes.get(at..at + 4).map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])) as usize;
+    let count = word(bytes, 24).min(4096);
+    let whole = count.min((bytes.len() - 128) / 16);
+    for entry in (0..whole).map(|i| 128 + i * 16) {
+        let (offset, length) = (word(bytes, entry + 4), word(bytes, entry + 8));
+        if let Some(section) = bytes.get(offset..offset.saturating_add(length)) {
+            let sum = crc32(0, section);
+            bytes[entry + 12..entry + 16].copy_from_slice(&sum.to_le_bytes());
+        }
+    }
+    repair_header_checksum(bytes);
+}
+
+fn metadata_part(metadata: &MetadataModel) -> Part {
+    let mut bytes = words_to_bytes(&[metadata.texel_nm[0], metadata.texel_nm[1], metadata.frame, metadata.image_origin, metadata.primaries, 0, 0, 0]);
+    for text in &metadata.texts {
+        bytes.extend((text.len() as u32).to_le_bytes());
+        bytes.extend(text.as_bytes());
+        bytes.resize(bytes.len().next_multiple_of(4), 0);
+    }
+    Part { kind: METADATA, instance: 0, bytes }
+}
+
+fn directions_part(instance: u32, points: &[[i32; 2]], t: &Triangulation) -> Part {
+    let mut words = vec![points.len() as u32, t.triangles.len() as u32, t.hull.len() as u32, t.grid_size, t.candidates.len() as u32, 0, 0, 0];
+    for &[x, y] in points {
+        words.extend([x as u16 as u32 | (y as u16 as u32) << 16, cosine_of(x, y)]);
+    }
+    for &[a, b, c] in &t.triangles {
+        let [p, q, r] = [a, b, c].map(|i| points[i as usize]);
+        let area = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
+        let (shift, reciprocal) = reciprocal_of(area as u32);
+        words.extend([a | b << 16, c | shift << 16, reciprocal]);
+    }
+    for (i, &a) in t.hull.iter().enumerate() {
+        let (p, q) = (points[a as usize], points[t.hull[(i + 1) % t.hull.len()] as usize]);
+        let (dx, dy) = (q[0] - p[0], q[1] - p[1]);
+        let (shift, reciprocal) = reciprocal_of((dx * dx + dy * dy) as u32);
+        words.extend([a | shift << 16, reciprocal]);
+    }
+    words.extend(&t.starts);
+    words.extend(&t.candidates);
+    Part { kind: DIRECTIONS, instance, bytes: words_to_bytes(&words) }
+}
+
+fn pair_table_part(kind: u32, channel: u32, table: &PairTableModel, light_count: u32) -> Part {
+    let mut words = vec![table.base_q20 as u32, table.shift, 0, 0];
+    pack_rows(&mut words, &table.entries, light_count);
+    Part { kind, instance: channel, bytes: words_to_bytes(&words) }
+}
+
+fn factor_parts(ensembles: &[(u32, &EnsembleModel)]) -> Vec<Part> {
+    let mut parts = Vec::new();
+    for &(c, ensemble) in ensembles {
+        for kind in [ANGULAR, SPATIAL] {
+            let pairs: Vec<[&FactorModel; 2]> =
+                ensemble.dictionaries.iter().map(|d| if kind == ANGULAR { [&d.light, &d.view] } else { [&d.x, &d.y] }).collect();
+            let mut words = vec![pairs.len() as u32, 0];
+            let mut tables = Vec::new();
+            let head = 2 + pairs.len() as u32 * 4;
+            for pair in &pairs {
+                words.extend(pair.map(|factor| factor.columns));
+                for factor in pair {
+                    words.push(head + tables.len() as u32);
+                    pack_rows(&mut tables, &factor.entries, factor.columns);
+                }
+            }
+            words.extend(tables);
+            parts.push(Part { kind, instance: c, bytes: words_to_bytes(&words) });
+        }
+    }
+    parts
+}
+
+fn atoms_part(channel: u32, ensemble: &EnsembleModel) -> Part {
+    let mut words = vec![ensemble.atoms.len() as u32, 0];
+    let mut start = 2 + ensemble.atoms.len() as u32 * 2;
+    for atoms in &ensemble.atoms {
+        words.extend([atoms.len() as u32, start]);
+        start += atoms.len() as u32 * 2;
+    }
+    words.extend(ensemble.atoms.iter().flatten().flat_map(|atom| [atom.word(), atom.quantiser()]));
+    Part { kind: ATOMS, instance: channel, bytes: words_to_bytes(&words) }
+}
+
+/// Bits, lowest first.
+#[derive(Default)]
+struct BitWriter {
+    words: Vec<u32>,
+    length: u32,
+}
+
+impl BitWriter {
+    fn push(&mut self, value: u32, count: u32) {
+        for i in 0..count {
+            if self.length % 32 == 0 {
+                self.words.push(0);
+            }
+            *self.words.last_mut().expect("just pushed") |= (value.checked_shr(i).unwrap_or(0) & 1) << (self.length % 32);
+            self.length += 1;
+        }
+    }
+}
+
+/// Bits that hold `0 ..= largest`.
+fn bits_for(largest: u32) -> u32 {
+    32 - largest.leading_zeros()
+}
+
+/// The number of low bits that makes the positions of a record shortest (10.4, Elias-Fano).
+fn best_low_bits(positions: impl Iterator<Item = u32> + Clone) -> u32 {
+    let count = positions.clone().count() as u32;
+    let last = positions.last().unwrap_or(0);
+    (0..=LOW_BITS_LIMIT).min_by_key(|&low| count * low + (last >> low)).unwrap_or(0)
+}
+
+fn coefficients_bytes(coefficients: &CoefficientsModel, dictionaries: u32, largest: u32) -> Vec<u8> {
+    let dictionary_bits = bits_for(dictionaries - 1);
+    let count_bits = bits_for(largest).max(1);
+    let mut stream = BitWriter::default();
+    let mut starts = Vec::with_capacity(coefficients.records.len());
+    for record in &coefficients.records {
+        starts.push(stream.length);
+        let list = &record.coefficients;
+        stream.push(list.len() as u32, count_bits);
+        if list.is_empty() {
+            stream.push(0, dictionary_bits + SHIFT_BITS + LOW_BITS_BITS);
+            continue;
+        }
+        let low_bits = best_low_bits(list.iter().map(|c| c.0));
+        stream.push(record.dictionary, dictionary_bits);
+        stream.push(record.shift - SHIFT_BIAS, SHIFT_BITS);
+        stream.push(low_bits, LOW_BITS_BITS);
+        for &(position, value) in list {
+            stream.push(position, low_bits);
+            stream.push(value as u32, coefficients.value_bits);
+        }
+        let mut high = 0;
+        for &(position, _) in list {
+            stream.push(0, (position >> low_bits) - high);
+            stream.push(1, 1);
+            high = position >> low_bits;
+        }
+    }
+    let mut words = vec![coefficients.value_bits | dictionary_bits << 8 | count_bits << 16, coefficients.records.len() as u32, stream.length, largest];
+    words.extend(starts);
+    words.extend(stream.words);
+    words_to_bytes(&words)
+}
