@@ -223,7 +223,7 @@ pub fn locate_on_hull(words: Words<'_>, start: u32, direction: Direction) -> Tap
         let position = hull_edge_position(words, start, edge, px, py);
         // 5.7-2: the foot of the perpendicular lies on this edge and the point is not inside of it.
         if position == 1 && cross(ax, ay, bx, by, px, py) <= 0 {
-            let along = dot(ax, ay, bx, by, px, py);
+            let along = dot_product(ax, ay, bx, by, px, py);
             let reciprocal = word(words, hull.wrapping_add(edge.wrapping_mul(2)).wrapping_add(1));
             let weight_b = ratio_q15(along, first >> 16, reciprocal, ONE_Q15);
             return beyond_hull(words, start, direction, a, b, weight_b);
@@ -244,7 +244,7 @@ pub fn locate_on_hull(words: Words<'_>, start: u32, direction: Direction) -> Tap
 /// Dot product of `a` to `b` with `a` to `p` (5.7-1).
 ///
 /// At most |b-a| |p-a| <= 2^15 * 39,555 < 2^31, and each product at most 2^30.
-pub fn dot(ax: i32, ay: i32, bx: i32, by: i32, px: i32, py: i32) -> i32 {
+pub fn dot_product(ax: i32, ay: i32, bx: i32, by: i32, px: i32, py: i32) -> i32 {
     // 5.7-1: exact.
     let first = bx.wrapping_sub(ax).wrapping_mul(px.wrapping_sub(ax));
     let second = by.wrapping_sub(ay).wrapping_mul(py.wrapping_sub(ay));
@@ -265,10 +265,10 @@ pub fn hull_edge_position(words: Words<'_>, start: u32, edge: u32, px: i32, py: 
     let bx = point_x_q14(words, start, b);
     let by = point_y_q14(words, start, b);
     // 5.7-1: measured from both ends, so that no squared length is needed.
-    if dot(ax, ay, bx, by, px, py) < 0 {
+    if dot_product(ax, ay, bx, by, px, py) < 0 {
         return 0;
     }
-    if dot(bx, by, ax, ay, px, py) < 0 {
+    if dot_product(bx, by, ax, ay, px, py) < 0 {
         return 2;
     }
     1

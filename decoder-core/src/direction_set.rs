@@ -6,7 +6,7 @@
 //! sides. The grid lists every triangle that meets a cell, so the first hit is always found.
 
 use crate::check::{Check, Section};
-use crate::direction::{cross, dot, grid_cell, grid_start, hull_start, point_x_q14, point_y_q14, triangles_start};
+use crate::direction::{cross, dot_product, grid_cell, grid_start, hull_start, point_x_q14, point_y_q14, triangles_start};
 use crate::error::Rule;
 use crate::words::word;
 
@@ -262,7 +262,7 @@ fn check_hull(check: &mut Check<'_, '_>, set: &Set) -> bool {
             return false;
         }
         let (p, q) = (set.point(check, a), set.point(check, b));
-        let (shift, reciprocal) = reciprocal_of(dot(p.0, p.1, q.0, q.1, q.0, q.1) as u32);
+        let (shift, reciprocal) = reciprocal_of(dot_product(p.0, p.1, q.0, q.1, q.0, q.1) as u32);
         let holds = first >> 16 == shift && word(check.words, at + 1) == reciprocal;
         if !check.ensure(holds, Rule::HullEdge, set.byte(at), first) {
             return false;
@@ -277,7 +277,7 @@ fn check_hull(check: &mut Check<'_, '_>, set: &Set) -> bool {
         }
         let [p, q, r] = [edge, edge + 1, edge + 2].map(|n| set.point(check, set.hull_vertex(check, n % set.hull_count)));
         let turn = cross(p.0, p.1, q.0, q.1, r.0, r.1);
-        let back = dot(q.0, q.1, p.0, p.1, r.0, r.1) > 0;
+        let back = dot_product(q.0, q.1, p.0, p.1, r.0, r.1) > 0;
         let flat = set.triangle_count == 0;
         // A flat set goes along a line and back: straight on but for its two ends, where it returns.
         let end = flat && (edge + 1) % set.hull_count % (set.hull_count / 2).max(1) == 0;

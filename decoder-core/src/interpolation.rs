@@ -94,9 +94,9 @@ pub fn filtered_values(words: Words<'_>, material: &Material, level: u32, u_q32:
 }
 
 /// Part of the way from one value to another (9.2-3).
-pub fn between(from: i32, to: i32, fraction_q15: i32) -> i32 {
+pub fn between(from_value: i32, to_value: i32, fraction_q15: i32) -> i32 {
     // 9.2-3: values are within 2^27, so the difference is exact.
-    from.wrapping_add(multiply_q15(to.wrapping_sub(from), fraction_q15))
+    from_value.wrapping_add(multiply_q15(to_value.wrapping_sub(from_value), fraction_q15))
 }
 
 /// Values between two levels, the level in Q16 (9.2).

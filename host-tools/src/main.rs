@@ -1,19 +1,32 @@
 use selvedge_tools::*;
 fn main(){
-  for name in ["carpet07","felt05"] {
-    let m=sparsebtf::read_material(std::path::Path::new("/work/shared/data/sparsebtf"),name,None).unwrap();
-    for bits in [8,9,10,11] {
-    let b=write::write_material(&m.to_model(bits).unwrap());
-    let t=std::time::Instant::now();
-    let s=selvedge::open(&b,&selvedge::Limits::default());
-    println!("{name} bits {bits} {} bytes {:?}", b.len(), t.elapsed());
-    match s { Ok(s)=>{ println!("{:?}", s.header().operations);
-      for (x,y,l,v) in [(13,391,5,9),(110,301,42,110),(207,211,79,60)] {
-        let p=s.point_values(x,y,l,v); let f=|q:i32| q as f64/1048576.0*std::f64::consts::LN_2;
-        println!("{} {} | {} {}", f(p.c1),f(p.c2), m.value(1,x as usize,y as usize,l as usize,v as usize), m.value(2,x as usize,y as usize,l as usize,v as usize));
-      }
-      if bits==10 {for q in s.sections(){println!("{:x} {} {}",q.kind,q.instance,q.length);}}
-      }, Err(e)=>println!("{e}") }
-    }
+  let mut bad=0;
+  let mut files=vec![];
+  for seed in 0..300u64 {
+    let m=extreme::extreme_model(seed);
+    let b=write::write_material(&m);
+    let mut n=0;
+    let ok=selvedge::validate(&b,None,&selvedge::Limits::NONE,&mut |f:selvedge::Finding|{ if n<3 {println!("{seed}: {f}");} n+=1; true});
+    if !ok {bad+=1;}
+    let (a,d)=write::write_split(&m);
+    if m.channels.iter().any(|c|c.ensemble.is_some()) { if let Err(e)=selvedge::open_with(&a,Some(&d),&selvedge::Limits::NONE) {println!("{seed} split {e}");}
+     if !selvedge::validate(&d,None,&selvedge::Limits::NONE,&mut |f:selvedge::Finding|{println!("{seed} dict {f}"); true}){bad+=1;} }
+    files.push(b);
+  }
+  println!("bad {bad}, bytes {}", files.iter().map(Vec::len).sum::<usize>());
+  let g=gpu::Gpu::new(wgpu::Backends::VULKAN).unwrap().unwrap();
+  println!("{}",g.description);
+  let mut mats=vec![];
+  for f in &files { mats.push(selvedge::open(f,&selvedge::Limits::NONE).unwrap()); }
+  let loaded=g.load(&mats);
+  let mut r=random::Random::new(1);
+  for entry in ["point","filtered","trilinear","floats"] {
+  let q:Vec<gpu::Query>=(0..300_000).map(|i|{ let mut w=||r.word() as i32; let mut d=||[(w()>>16) as u32,(w()>>16) as u32,(w()>>16) as u32]; let l=d(); let v=d();
+     gpu::Query{material:(i%300) as u32,u:r.word(),v:r.word(),level_q16:r.word()>>14,light:l,view:v}}).collect();
+  let t=std::time::Instant::now();
+  let a=g.answer(&loaded,entry,&q).unwrap();
+  let tg=t.elapsed(); let t=std::time::Instant::now();
+  let c:Vec<_>=q.iter().map(|q|gpu::answer_on_cpu(&mats[q.material as usize],entry,q)).collect();
+  println!("{entry} gpu {tg:?} cpu {:?} differ {}", t.elapsed(), a.iter().zip(&c).filter(|(a,b)|a!=b).count());
   }
 }

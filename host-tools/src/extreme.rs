@@ -1,0 +1,184 @@
+//! Legal files at the ends of what is legal, by seed: for the tests that hold decoders equal.
+//!
+//! Every field takes its smallest and largest value for some seed; sums come as close to their bounds
+//! as random numbers get. What a seed gives is only promised to be legal, not to look like a material.
+
+use crate::model::{
+    AtomModel, ChannelModel, CoefficientsModel, DictionaryModel, EnsembleModel, FactorModel, MaterialModel, MetadataModel, PairTableModel, RecordModel,
+    TransferModel,
+};
+use crate::random::Random;
+use selvedge::ensemble::dequantise;
+use selvedge::ensemble_set::SUM_LIMIT;
+use selvedge::material::level_size;
+use std::collections::BTreeSet;
+
+/// A legal material by its seed.
+pub fn extreme_model(seed: u64) -> MaterialModel {
+    let mut random = Random::new(seed);
+    let r = &mut random;
+    let any_size = r.range(2, 40) as u32;
+    let size = [r.pick(&[any_size, any_size, 1, 2, 17]), r.pick(&[any_size / 2 + 1, any_size, 1, 3, 33])];
+    let edge = r.range(1, 16) as u32;
+    let most_levels = 1 + size[0].max(size[1]).next_power_of_two().trailing_zeros();
+    let level_count = r.pick(&[1, 1, most_levels, r.clone().range(1, most_levels as i64) as u32]);
+    let layer_count = r.pick(&[1, 1, 1, 2, 3, 8]);
+    let offset = r.pick(&[0.0, 1.0, f32::MIN_POSITIVE, 1e-5, 0.7]);
+    let transfer = if r.once_in(3) { TransferModel::Linear { exponent: r.pick(&[-60, -7, 0, 13, 60]) } } else { TransferModel::Log2 { offset } };
+    let plain_matrix = r.once_in(2);
+    let matrix_q13 = std::array::from_fn(|_| if plain_matrix { r.pick(&[0, 8192, 8192, -4096]) } else { r.entry() });
+    let lights = extreme_directions(r);
+    let views = if r.once_in(3) { None } else { Some(extreme_directions(r)) };
+    let view_count = views.as_ref().map_or(lights.len(), Vec::len);
+    let blocks: Vec<u32> = (0..level_count).map(|level| size.map(|s| level_size(s, level).div_ceil(edge)).iter().product()).collect();
+    let channels = std::array::from_fn(|_| {
+        let state = r.pick(&[0, 1, 2, 2, 2, 2]);
+        ChannelModel {
+            mean: (state > 0).then(|| extreme_table(r, lights.len(), view_count, false)),
+            scale: (state == 2 && r.once_in(2)).then(|| extreme_table(r, lights.len(), view_count, true)),
+            ensemble: (state == 2).then(|| extreme_ensemble(r, edge, lights.len(), view_count, &blocks, layer_count)),
+        }
+    });
+    let extras = if r.once_in(4) { vec![(0x8001, 7, vec![1; 4 * r.range(0, 9) as usize]), (0xffff, 0xffff, Vec::new())] } else { Vec::new() };
+    MaterialModel {
+        size,
+        level_count,
+        edge,
+        layer_count,
+        transfer,
+        cosine_included: r.once_in(2),
+        matrix_q13,
+        metadata: MetadataModel {
+            texel_nm: [r.word(), r.pick(&[0, u32::MAX])],
+            frame: r.range(0, 2) as u32,
+            image_origin: r.range(0, 2) as u32,
+            primaries: r.range(0, 4) as u32,
+            texts: [format!("seed {seed}"), "\u{10ffff}\u{e9}".repeat(r.range(0, 5) as usize), String::new()],
+        },
+        lights,
+        views,
+        channels,
+        extras,
+    }
+}
+
+/// One, two, many, collinear, co-circular, nearly coincident, on the horizon.
+fn extreme_directions(r: &mut Random) -> Vec<[i32; 2]> {
+    let in_disc = |[x, y]: [i32; 2]| x * x + y * y <= 1 << 28;
+    let mut points: Vec<[i32; 2]> = Vec::new();
+    match r.range(0, 9) {
+        0 => points.push([r.range(-9000, 9000) as i32, r.range(-9000, 9000) as i32]),
+        1 => points.extend([[r.pick(&[-16_384, 0]), 0], [r.pick(&[1, 16_384]), 0]]),
+        2 => {
+            let (dx, dy) = r.pick(&[(1, 0), (0, 1), (37, -12), (101, 100)]);
+            let n = r.range(3, 40) as i32;
+            points.extend((0..n).map(|i| [(i - n / 2) * dx, (i - n / 2) * dy]));
+            points.sort_by_key(|p| (p[0] * 7919 + p[1] * 104_729) % 1009);
+        }
+        3 => points.extend([[16_384, 0], [0, 16_384], [-16_384, 0], [0, -16_384], [0, 0]]),
+        4 => points.extend([[3, 5], [4, 5], [3, 6], [4, 6], [5, 5]]),
+        5 => {
+            // Pythagorean points: exactly co-circular.
+            let base = [[3, 4], [4, 3], [5, 0], [4, -3], [3, -4], [0, -5], [-3, -4], [-4, -3], [-5, 0], [-4, 3], [-3, 4], [0, 5]];
+            let scale = r.range(1, 3276) as i32;
+            points.extend(base.map(|p| p.map(|c| c * scale)));
+        }
+        6 => {
+            // Rings as measured grids have them.
+            points.push([0, 0]);
+            for ring in 1..=r.range(1, 6) {
+                let n = ring * 6;
+                let radius = ring as f64 * 2100.0;
+                points.extend((0..n).map(|i| (i as f64 / n as f64 * std::f64::consts::TAU).sin_cos()).map(|(s, c)| [(c * radius) as i32, (s * radius) as i32]));
+            }
+        }
+        7 => points.extend((0..r.range(3, 60)).map(|_| [r.range(-60, 60) as i32 * 190, r.range(-60, 60) as i32 * 190])),
+        _ => {
+            let reach = r.pick(&[40, 2000, 16_384]);
+            points.extend((0..r.range(4, 90)).map(|_| [r.range(-reach, reach) as i32, r.range(-reach, reach) as i32]));
+        }
+    }
+    let mut seen = BTreeSet::new();
+    points.retain(|&p| in_disc(p) && seen.insert(p));
+    if points.is_empty() {
+        points.push([0, 0]);
+    }
+    points
+}
+
+fn extreme_table(r: &mut Random, lights: usize, views: usize, is_scale: bool) -> PairTableModel {
+    let any = r.range(-(1 << 26), 1 << 26) as i32;
+    let base_q20 = if is_scale { 0 } else { r.pick(&[0, any >> 6, any, 1 << 26, -(1 << 26)]) };
+    let most = if is_scale { 8 } else { 11 };
+    let shift = r.pick(&[0, most, r.clone().range(0, most) as u32 as i64]) as u32;
+    PairTableModel { base_q20, shift, entries: (0..lights * views).map(|_| r.entry()).collect() }
+}
+
+fn extreme_factor(r: &mut Random, rows: usize, most_columns: i64) -> FactorModel {
+    let columns = r.range(1, most_columns) as u32;
+    let constant = r.once_in(4).then(|| r.pick(&[32_767i16, -32_767]));
+    FactorModel { columns, entries: (0..rows * columns as usize).map(|_| constant.unwrap_or_else(|| r.entry())).collect() }
+}
+
+fn extreme_ensemble(r: &mut Random, edge: u32, lights: usize, views: usize, blocks: &[u32], layers: u32) -> EnsembleModel {
+    let dictionaries: Vec<DictionaryModel> = (0..r.range(1, 4))
+        .map(|_| {
+            let most = r.pick(&[3, 20, 60]);
+            DictionaryModel {
+                light: extreme_factor(r, lights, most),
+                view: extreme_factor(r, views, most),
+                x: extreme_factor(r, edge as usize, edge as i64),
+                y: extreme_factor(r, edge as usize, edge as i64),
+            }
+        })
+        .collect();
+    let atoms: Vec<Vec<AtomModel>> = dictionaries.iter().map(|d| extreme_atoms(r, d)).collect();
+    let value_bits = r.pick(&[1, 8, 16, r.clone().range(1, 16) as u32]);
+    let coefficients = blocks
+        .iter()
+        .map(|&count| {
+            (0..layers)
+                .map(|_| CoefficientsModel { value_bits, records: (0..count).map(|_| extreme_record(r, &atoms, value_bits)).collect() })
+                .collect()
+        })
+        .collect();
+    EnsembleModel { dictionaries, atoms, coefficients }
+}
+
+fn extreme_atoms(r: &mut Random, d: &DictionaryModel) -> Vec<AtomModel> {
+    let mut of_key = std::collections::BTreeMap::new();
+    for _ in 0..r.pick(&[1, 5, 60, 400]) {
+        let mut column = |factor: &FactorModel| r.range(0, factor.columns as i64 - 1) as u32;
+        let (light, view, x, y) = (column(&d.light), column(&d.view), column(&d.x), column(&d.y));
+        let base = r.entry();
+        let room = 32_767 - base as i64;
+        let step = r.pick(&[0, room, r.clone().range(0, room)]) as u16;
+        let atom = AtomModel { light, view, x, y, shift: r.pick(&[0, 15, r.clone().range(0, 15) as u32]), base, step };
+        of_key.insert(atom.word() >> 4, atom);
+    }
+    of_key.into_values().collect()
+}
+
+fn extreme_record(r: &mut Random, atoms: &[Vec<AtomModel>], value_bits: u32) -> RecordModel {
+    let dictionary = r.range(0, atoms.len() as i64 - 1) as u32;
+    let list = &atoms[dictionary as usize];
+    if r.once_in(6) || list.is_empty() {
+        return RecordModel { shift: 5, ..RecordModel::default() };
+    }
+    let keep = r.pick(&[1, 1, 2, 9]);
+    let most = (1u32 << value_bits) - 1;
+    let mut sum = 0;
+    let mut coefficients = Vec::new();
+    for (position, atom) in (0u32..).zip(list) {
+        let value = r.pick(&[0, most, r.clone().range(0, most as i64) as u32]) as u16;
+        let part = dequantise(atom.quantiser(), value as u32, value_bits).unsigned_abs().div_ceil(1 << atom.shift);
+        if r.once_in(keep) && sum + part <= SUM_LIMIT {
+            sum += part;
+            coefficients.push((position, value));
+        }
+    }
+    if coefficients.is_empty() {
+        return RecordModel { shift: 5, ..RecordModel::default() };
+    }
+    RecordModel { dictionary, shift: r.pick(&[5, 31, r.clone().range(5, 31) as u32]), coefficients }
+}

@@ -1,0 +1,271 @@
+// Directions and their triangulation (chapter 5). Twin: decoder-core/src/direction.rs.
+//
+// A direction is a point of the unit disc under the stereographic projection x/(1+z), y/(1+z), in
+// Q14, with its cosine in Q15. A sample set is located by a grid of candidate triangles with exact
+// integer orientation tests; beyond the hull the point moves to the nearest place on it.
+
+// One in Q14: the radius of the disc.
+const ONE_Q14: i32 = 16384;
+// One in Q30.
+const ONE_Q30: i32 = 0x40000000;
+
+// A direction of the upper hemisphere, or below it with a zero cosine.
+struct Direction {
+    x_q14: i32,
+    y_q14: i32,
+    z_q15: i32,
+}
+
+// Three sample directions of a set and their weights, which sum to ONE_Q15 exactly.
+struct Taps {
+    a: u32,
+    b: u32,
+    c: u32,
+    weight_a_q15: i32,
+    weight_b_q15: i32,
+    weight_c_q15: i32,
+    cosine_q15: i32,
+}
+
+// |value| as Q30 with its sign, from binary32 bits; magnitudes of one and more, infinities and NaN give one (5.2-1).
+fn binary32_to_q30(bits: u32) -> i32 {
+    let exponent = (bits >> 23u) & 0xffu;
+    let mantissa = (bits & 0x7fffffu) | 0x800000u;
+    // 5.2-1: a value below one has an exponent field of at most 126; it is mantissa * 2^(exponent - 150).
+    let shift = 126u - exponent;
+    var magnitude = ONE_Q30;
+    if (exponent < 127u) {
+        magnitude = 0;
+        if (shift < 31u) {
+            magnitude = round_shift(i32(mantissa << 6u), shift);
+        }
+    }
+    if ((bits >> 31u) != 0u) {
+        return -magnitude;
+    }
+    return magnitude;
+}
+
+// round(|n| / d * 2^14) with the sign of n, for |n| <= d (5.2-2).
+fn project_q14(n: i32, d: u32) -> i32 {
+    // 5.2-2: one more bit than needed, then halves up.
+    let magnitude = i32((divide_q15(u32(abs(n)), d) + 1u) >> 1u);
+    if (n < 0) {
+        return -magnitude;
+    }
+    return magnitude;
+}
+
+// The direction of a unit vector given as three binary32 bit patterns (5.2-3).
+fn direction_from_binary32(x_bits: u32, y_bits: u32, z_bits: u32) -> Direction {
+    let x_q30 = binary32_to_q30(x_bits);
+    let y_q30 = binary32_to_q30(y_bits);
+    // 5.2-3: below the horizon the point is that of the horizon and the cosine is zero.
+    let z_q30 = max(binary32_to_q30(z_bits), 0);
+    let d = u32(ONE_Q30) + u32(z_q30);
+    return Direction(project_q14(x_q30, d), project_q14(y_q30, d), round_shift(z_q30, 15u));
+}
+
+// The direction with every part within its range (5.1-2).
+fn clamp_direction(direction: Direction) -> Direction {
+    // 5.1-2: what lies outside the ranges is moved to their ends.
+    return Direction(
+        max(min(direction.x_q14, ONE_Q14), -ONE_Q14),
+        max(min(direction.y_q14, ONE_Q14), -ONE_Q14),
+        max(min(direction.z_q15, ONE_Q15), 0),
+    );
+}
+
+// One sample direction alone (5.1-3).
+fn single_tap(index: u32) -> Taps {
+    // 5.1-3: the other two weights are zero.
+    return Taps(index, index, index, ONE_Q15, 0, 0, ONE_Q15);
+}
+
+// First word of the sample directions of the set at `start` (5.3).
+fn points_start(start: u32) -> u32 {
+    return start + 8u;
+}
+
+// First word of the triangles (5.3).
+fn triangles_start(start: u32) -> u32 {
+    return points_start(start) + word(start) * 2u;
+}
+
+// First word of the hull (5.3).
+fn hull_start(start: u32) -> u32 {
+    return triangles_start(start) + word(start + 1u) * 3u;
+}
+
+// First word of the grid (5.3).
+fn grid_start(start: u32) -> u32 {
+    return hull_start(start) + word(start + 2u) * 2u;
+}
+
+// x of sample direction `index`, Q14 (5.3-3).
+fn point_x_q14(start: u32, index: u32) -> i32 {
+    return i32(word(points_start(start) + index * 2u) << 16u) >> 16u;
+}
+
+// y of sample direction `index`, Q14 (5.3-3).
+fn point_y_q14(start: u32, index: u32) -> i32 {
+    return i32(word(points_start(start) + index * 2u)) >> 16u;
+}
+
+// Cosine of sample direction `index`, Q15 (5.3-4).
+fn point_z_q15(start: u32, index: u32) -> i32 {
+    return i32(word(points_start(start) + index * 2u + 1u));
+}
+
+// Twice the signed area of the triangle a, b, p: positive if p is left of a to b (5.4-1).
+fn cross(ax: i32, ay: i32, bx: i32, by: i32, px: i32, py: i32) -> i32 {
+    // 5.4-1: exact.
+    let first = (bx - ax) * (py - ay);
+    let second = (by - ay) * (px - ax);
+    return first - second;
+}
+
+// part / whole in Q15 by the stored reciprocal of the whole, halves up, at most `limit` (5.4-2).
+fn ratio_q15(part: i32, shift: u32, reciprocal: u32, limit: i32) -> i32 {
+    // 5.4-2: part >> shift has 16 bits or fewer and the product at most 2^31.
+    let ratio = ((u32(part) >> shift) * reciprocal + u32(HALF_Q15) * 2u) >> 16u;
+    return min(i32(ratio), limit);
+}
+
+// The cell of the grid along one axis (5.5-1).
+fn grid_cell(q14: i32, grid_size: u32) -> u32 {
+    // 5.5-1: the last cell is closed.
+    let cell = (u32(q14 + ONE_Q14) * grid_size) >> 15u;
+    return min(cell, grid_size - 1u);
+}
+
+// The taps of a direction in the set at `start` (5.6).
+fn locate(start: u32, asked: Direction) -> Taps {
+    let direction = clamp_direction(asked);
+    let px = direction.x_q14;
+    let py = direction.y_q14;
+    let triangles = triangles_start(start);
+    let grid = grid_start(start);
+    let grid_size = word(start + 3u);
+    let cell = grid_cell(py, grid_size) * grid_size + grid_cell(px, grid_size);
+    let candidates = grid + grid_size * grid_size + 1u;
+    let last = word(grid + cell + 1u);
+    var candidate = word(grid + cell);
+    // 5.6-1: the first candidate that has the point inside or on its border.
+    while (candidate < last) {
+        let triangle = triangles + word(candidates + candidate) * 3u;
+        let first = word(triangle);
+        let second = word(triangle + 1u);
+        let a = first & 0xffffu;
+        let b = first >> 16u;
+        let c = second & 0xffffu;
+        let ax = point_x_q14(start, a);
+        let ay = point_y_q14(start, a);
+        let bx = point_x_q14(start, b);
+        let by = point_y_q14(start, b);
+        let cx = point_x_q14(start, c);
+        let cy = point_y_q14(start, c);
+        let area_a = cross(bx, by, cx, cy, px, py);
+        let area_b = cross(cx, cy, ax, ay, px, py);
+        let area_c = cross(ax, ay, bx, by, px, py);
+        if (area_a >= 0 && area_b >= 0 && area_c >= 0) {
+            // 5.6-2: two weights by reciprocal, the last is what is left.
+            let shift = second >> 16u;
+            let reciprocal = word(triangle + 2u);
+            let weight_a = ratio_q15(area_a, shift, reciprocal, ONE_Q15);
+            let weight_b = ratio_q15(area_b, shift, reciprocal, ONE_Q15 - weight_a);
+            let weight_c = ONE_Q15 - weight_a - weight_b;
+            return Taps(a, b, c, weight_a, weight_b, weight_c, ONE_Q15);
+        }
+        candidate += 1u;
+    }
+    return locate_on_hull(start, direction);
+}
+
+// The taps of the place on the hull nearest to a point that no triangle holds (5.7).
+fn locate_on_hull(start: u32, direction: Direction) -> Taps {
+    let px = direction.x_q14;
+    let py = direction.y_q14;
+    let hull = hull_start(start);
+    let hull_count = word(start + 2u);
+    var corner = 0u;
+    var past_previous = false;
+    var edge = 0u;
+    // 5.7-1: the last edge is looked at first, so that the first knows what precedes it.
+    if (hull_count > 0u) {
+        past_previous = hull_edge_position(start, hull_count - 1u, px, py) == 2u;
+    }
+    while (edge < hull_count) {
+        let first = word(hull + edge * 2u);
+        let a = first & 0xffffu;
+        // select(if false, if true, condition)
+        let next = select(0u, edge + 1u, edge + 1u < hull_count);
+        let b = word(hull + next * 2u) & 0xffffu;
+        let ax = point_x_q14(start, a);
+        let ay = point_y_q14(start, a);
+        let bx = point_x_q14(start, b);
+        let by = point_y_q14(start, b);
+        let position = hull_edge_position(start, edge, px, py);
+        // 5.7-2: the foot of the perpendicular lies on this edge and the point is not inside of it.
+        if (position == 1u && cross(ax, ay, bx, by, px, py) <= 0) {
+            let along = dot_product(ax, ay, bx, by, px, py);
+            let reciprocal = word(hull + edge * 2u + 1u);
+            let weight_b = ratio_q15(along, first >> 16u, reciprocal, ONE_Q15);
+            return beyond_hull(start, direction, a, b, weight_b);
+        }
+        // 5.7-3: between two edges: past the end of the one, before the begin of the other.
+        if (past_previous && position == 0u) {
+            corner = edge;
+        }
+        past_previous = position == 2u;
+        edge += 1u;
+    }
+    let at = word(hull + corner * 2u) & 0xffffu;
+    // 5.7-4: a set of one direction has no hull. select(if false, if true, condition)
+    let only = select(0u, at, hull_count > 0u);
+    return beyond_hull(start, direction, only, only, 0);
+}
+
+// Dot product of a to b with a to p (5.7-1).
+fn dot_product(ax: i32, ay: i32, bx: i32, by: i32, px: i32, py: i32) -> i32 {
+    // 5.7-1: exact.
+    let first = (bx - ax) * (px - ax);
+    let second = (by - ay) * (py - ay);
+    return first + second;
+}
+
+// 0 if the foot of the perpendicular from the point lies before hull edge `edge`, 1 on it, 2 past it (5.7-1).
+fn hull_edge_position(start: u32, edge: u32, px: i32, py: i32) -> u32 {
+    let hull = hull_start(start);
+    let hull_count = word(start + 2u);
+    // select(if false, if true, condition)
+    let next = select(0u, edge + 1u, edge + 1u < hull_count);
+    let a = word(hull + edge * 2u) & 0xffffu;
+    let b = word(hull + next * 2u) & 0xffffu;
+    let ax = point_x_q14(start, a);
+    let ay = point_y_q14(start, a);
+    let bx = point_x_q14(start, b);
+    let by = point_y_q14(start, b);
+    // 5.7-1: measured from both ends, so that no squared length is needed.
+    if (dot_product(ax, ay, bx, by, px, py) < 0) {
+        return 0u;
+    }
+    if (dot_product(bx, by, ax, ay, px, py) < 0) {
+        return 2u;
+    }
+    return 1u;
+}
+
+// Two directions of the hull, and the cosine beyond it (5.7-5).
+fn beyond_hull(start: u32, direction: Direction, a: u32, b: u32, weight_b: i32) -> Taps {
+    let weight_a = ONE_Q15 - weight_b;
+    let za = point_z_q15(start, a) * weight_a;
+    let zb = point_z_q15(start, b) * weight_b;
+    // 5.7-5: z over the clamped z, and one where the clamped z is not larger.
+    let sampled = (za + zb + HALF_Q15) >> 15u;
+    var cosine = ONE_Q15;
+    if (direction.z_q15 < sampled) {
+        cosine = i32(divide_q15(u32(direction.z_q15), u32(sampled)));
+    }
+    return Taps(a, b, a, weight_a, weight_b, 0, cosine);
+}

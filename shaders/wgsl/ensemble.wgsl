@@ -1,0 +1,209 @@
+// The sparse ensemble (chapter 10). Twin: decoder-core/src/ensemble.rs.
+//
+// After SparseBTF (Kavoosighafi et al. 2023), equation 5: a block of texels is a few coefficients over
+// products of one column of each of four factor matrices. A sample blends the rows of the factors
+// first and evaluates once (equation 6), in an order of products that lets work be shared.
+
+// Added to the stored five bits to give a record's shift (10.4-3).
+const SHIFT_BIAS: u32 = 5u;
+// Bits of a record's shift.
+const SHIFT_BITS: u32 = 5u;
+// Bits that hold the number of low position bits.
+const LOW_BITS_BITS: u32 = 4u;
+
+// What the fixed fields at the begin of a record say, and where its parts begin (10.4).
+struct Record {
+    stream: u32,
+    value_bits: u32,
+    count: u32,
+    dictionary: u32,
+    shift: u32,
+    low_bits: u32,
+    fields_bit: u32,
+    highs_bit: u32,
+}
+
+// `count` low bits of a window, for count <= 31 (10.4-1).
+fn low_part(window: u32, count: u32) -> u32 {
+    // 10.4-1: a mask by shift; the count never reaches 32.
+    return window & ((1u << count) - 1u);
+}
+
+// First word of the coefficients of a level, layer and channel, by the directory (10.3-1).
+fn coefficients_start(material: Material, channel: Channel, level: u32, layer: u32) -> u32 {
+    let layers = level * material.layer_count + layer;
+    let rank = layers * material.full_count + channel.full_rank;
+    let entry = material.coefficient_entry + rank * 4u;
+    // 10.3-1: the second word of an entry is the byte offset of its section.
+    return material.file_start + (word(entry + 1u) >> 2u);
+}
+
+// The fixed fields of the record of a block (10.4).
+fn read_record(start: u32, block: u32) -> Record {
+    let widths = word(start);
+    let value_bits = widths & 0xffu;
+    let dictionary_bits = (widths >> 8u) & 0xffu;
+    let count_bits = widths >> 16u;
+    let stream = start + 4u + word(start + 1u);
+    let bit = word(start + 4u + block);
+    // 10.4-2: count, dictionary, shift and low bits fit one window.
+    let window = bit_window(stream, bit);
+    let count = low_part(window, count_bits);
+    let dictionary = low_part(window >> count_bits, dictionary_bits);
+    let shift = low_part(window >> (count_bits + dictionary_bits), SHIFT_BITS) + SHIFT_BIAS;
+    let low_bits = (window >> (count_bits + dictionary_bits + SHIFT_BITS)) & 0xfu;
+    let fields_bit = bit + count_bits + dictionary_bits + SHIFT_BITS + LOW_BITS_BITS;
+    let highs_bit = fields_bit + count * (low_bits + value_bits);
+    return Record(stream, value_bits, count, dictionary, shift, low_bits, fields_bit, highs_bit);
+}
+
+// The integer coefficient that a stored value stands for (10.5-1).
+fn dequantise(quantiser: u32, value: u32, value_bits: u32) -> i32 {
+    let base = i32(quantiser << 16u) >> 16u;
+    let step = quantiser >> 16u;
+    let half = (1u << value_bits) >> 1u;
+    // 10.5-1: base + round(value * step / 2^value_bits).
+    return base + i32((value * step + half) >> value_bits);
+}
+
+// One column of three rows of a factor by their weights, Q15 (10.6-1).
+fn blend_column(table: u32, row_words: u32, taps: Taps, column: u32) -> i32 {
+    let a = packed_i16(table + taps.a * row_words, column) * taps.weight_a_q15;
+    let b = packed_i16(table + taps.b * row_words, column) * taps.weight_b_q15;
+    let c = packed_i16(table + taps.c * row_words, column) * taps.weight_c_q15;
+    // 10.6-1: the sum is exact, within 2^30; one rounding.
+    return (a + b + c + HALF_Q15) >> 15u;
+}
+
+// One column of two rows of a spatial factor by their weights, Q15 (10.6-2).
+fn blend_span(table: u32, row_words: u32, span: Span, column: u32) -> i32 {
+    let a = packed_i16(table + span.row_a * row_words, column) * span.weight_a_q15;
+    let b = packed_i16(table + span.row_b * row_words, column) * span.weight_b_q15;
+    // 10.6-2: the sum is exact, within 2^30; one rounding.
+    return (a + b + HALF_Q15) >> 15u;
+}
+
+// What one record adds to the texture of a channel, Q20 (10.7).
+fn record_q20(channel: Channel, record: Record, x: Span, y: Span, light: Taps, view: Taps) -> i32 {
+    // 10.1-3, 10.2-2, 10.5-2: the tables of the record's dictionary.
+    let angular_start = channel.angular_start;
+    let angular = angular_start + 2u + record.dictionary * 4u;
+    let light_row_words = (word(angular) + 1u) >> 1u;
+    let view_row_words = (word(angular + 1u) + 1u) >> 1u;
+    let light_table = angular_start + word(angular + 2u);
+    let view_table = angular_start + word(angular + 3u);
+    let spatial_start = channel.spatial_start;
+    let spatial = spatial_start + 2u + record.dictionary * 4u;
+    let x_row_words = (word(spatial) + 1u) >> 1u;
+    let y_row_words = (word(spatial + 1u) + 1u) >> 1u;
+    let x_table = spatial_start + word(spatial + 2u);
+    let y_table = spatial_start + word(spatial + 3u);
+    let atoms_start = channel.atoms_start;
+    let atoms = atoms_start + word(atoms_start + 3u + record.dictionary * 2u);
+
+    let field_bits = record.low_bits + record.value_bits;
+    var total = 0;
+    var sum_y = 0;
+    var sum_xy = 0;
+    var column_x = 0u;
+    var column_y = 0u;
+    var column_light = 0xffffffffu;
+    var column_view = 0xffffffffu;
+    var u_light = 0;
+    var u_view = 0;
+    var bit = record.highs_bit;
+    var high = 0u;
+    var index = 0u;
+    while (index < record.count) {
+        // 10.4-4: the high part of a position is the number of zeros before its one.
+        var window = bit_window(record.stream, bit);
+        while (window == 0u && high < 65536u) {
+            high += 32u;
+            bit += 32u;
+            window = bit_window(record.stream, bit);
+        }
+        let zeros = countTrailingZeros(window) & 31u;
+        high += zeros;
+        bit += zeros + 1u;
+        // 10.4-5: low part and value stand side by side at a fixed distance.
+        let field = bit_window(record.stream, record.fields_bit + index * field_bits);
+        let position = (high << record.low_bits) | low_part(field, record.low_bits);
+        let value = low_part(field >> record.low_bits, record.value_bits);
+        let atom = word(atoms + position * 2u);
+        let quantiser = word(atoms + position * 2u + 1u);
+        let coefficient = dequantise(quantiser, value, record.value_bits);
+
+        // 10.7-3: a change of the spatial atom closes its sum; a change of y also that of x.
+        let next_x = (atom >> 24u) & 0xfu;
+        let next_y = atom >> 28u;
+        if (next_x != column_x || next_y != column_y) {
+            sum_y += multiply_q15(sum_xy, blend_span(x_table, x_row_words, x, column_x));
+            sum_xy = 0;
+            column_x = next_x;
+        }
+        if (next_y != column_y) {
+            total += multiply_q15(sum_y, blend_span(y_table, y_row_words, y, column_y));
+            sum_y = 0;
+            column_y = next_y;
+        }
+        // 10.7-1: the product of the two angular columns is rounded to Q15.
+        let next_light = (atom >> 14u) & 0x3ffu;
+        if (next_light != column_light) {
+            column_light = next_light;
+            u_light = blend_column(light_table, light_row_words, light, next_light);
+        }
+        let next_view = (atom >> 4u) & 0x3ffu;
+        if (next_view != column_view) {
+            column_view = next_view;
+            u_view = blend_column(view_table, view_row_words, view, next_view);
+        }
+        let u_angular = (u_light * u_view + HALF_Q15) >> 15u;
+        // 10.7-2: times the coefficient, by the atom's own shift; within 2^30 before it.
+        sum_xy += round_shift(coefficient * u_angular, atom & 0xfu);
+        index += 1u;
+    }
+    sum_y += multiply_q15(sum_xy, blend_span(x_table, x_row_words, x, column_x));
+    total += multiply_q15(sum_y, blend_span(y_table, y_row_words, y, column_y));
+    // 10.7-4: to Q20.
+    return round_shift(total, record.shift);
+}
+
+// The texture of one block, all layers, Q20 (10.7-5).
+fn block_q20(material: Material, channel: Channel, level: u32, x: Span, y: Span, light: Taps, view: Taps) -> i32 {
+    let blocks_x = block_count(material, level_size(material.width, level));
+    let block = y.block * blocks_x + x.block;
+    var sum = 0;
+    var layer = 0u;
+    // 10.7-5: layers add up; each record is rounded by itself.
+    while (layer < material.layer_limit) {
+        let start = coefficients_start(material, channel, level, layer);
+        let record = read_record(start, block);
+        if (record.count > 0u) {
+            sum += record_q20(channel, record, x, y, light, view);
+        }
+        layer += 1u;
+    }
+    return sum;
+}
+
+// The texture of a channel between texels: the sum over one, two or four blocks, Q20 (10.7-6).
+fn texture_q20(material: Material, channel: Channel, level: u32, x: Axis, y: Axis, light: Taps, view: Taps) -> i32 {
+    var sum = 0;
+    var corner = 0u;
+    // 10.7-6: the weights are in the rows, so the blocks only add.
+    while (corner < x.count * y.count) {
+        var span_x = x.first;
+        if ((corner & 1u) != 0u && x.count == 2u) {
+            span_x = x.second;
+        }
+        // select(if false, if true, condition)
+        let in_second_row = select(corner, corner >> 1u, x.count == 2u);
+        var span_y = y.first;
+        if (in_second_row != 0u) {
+            span_y = y.second;
+        }
+        sum += block_q20(material, channel, level, span_x, span_y, light, view);
+        corner += 1u;
+    }
+    return sum;
+}

@@ -1,0 +1,99 @@
+// Fixed-point arithmetic (chapter 2). Twin: decoder-core/src/fixed.rs.
+//
+// Everything that decides a bit of a result is here or built from what is here: 32-bit integers that
+// wrap, shifts, comparisons. Nothing divides and nothing is a float, so every machine agrees.
+
+// One in Q15.
+const ONE_Q15: i32 = 32768;
+// One half in Q15, added before a shift by 15 to round halves up.
+const HALF_Q15: i32 = 16384;
+// One half in Q13.
+const HALF_Q13: i32 = 4096;
+// round(ln 2 * 2^20): turns 12 fraction bits of a Q20 exponent into a Q40 natural exponent.
+const LN2_Q20: u32 = 726817u;
+// The largest finite binary32.
+const BINARY32_MAX: u32 = 0x7f7fffffu;
+
+// floor((p * u + 2^14) / 2^15), for |u| <= 2^15 (2.2-1).
+fn multiply_q15(p: i32, u: i32) -> i32 {
+    // 2.2-1: the high limb is exact, only the low one is rounded.
+    return (p >> 15u) * u + (((p & 0x7fff) * u + HALF_Q15) >> 15u);
+}
+
+// floor((p * u + 2^12) / 2^13), for |u| < 2^15 and |p| <= 2^27 (2.2-2).
+fn multiply_q13(p: i32, u: i32) -> i32 {
+    // 2.2-2: as 2.2-1 with 13 fraction bits.
+    return (p >> 13u) * u + (((p & 0x1fff) * u + HALF_Q13) >> 13u);
+}
+
+// floor((p + 2^(shift-1)) / 2^shift), and p for a shift of zero (2.2-3). shift <= 31.
+fn round_shift(p: i32, shift: u32) -> i32 {
+    if (shift == 0u) {
+        return p;
+    }
+    // 2.2-3: the highest bit that falls off says whether to round up; nothing overflows.
+    return (p >> shift) + ((p >> (shift - 1u)) & 1);
+}
+
+// floor(a * b / 2^32) (2.2-4).
+fn product_high(a: u32, b: u32) -> u32 {
+    // 2.2-4: four 16-bit limb products; no partial sum exceeds 32 bits.
+    let low = (a & 0xffffu) * (b & 0xffffu);
+    let middle_a = (a >> 16u) * (b & 0xffffu) + (low >> 16u);
+    let middle_b = (a & 0xffffu) * (b >> 16u) + (middle_a & 0xffffu);
+    return (a >> 16u) * (b >> 16u) + (middle_a >> 16u) + (middle_b >> 16u);
+}
+
+// floor(n * 2^15 / d) for n <= d, 1 <= d <= 2^31 (2.2-5).
+fn divide_q15(n: u32, d: u32) -> u32 {
+    var remainder = n;
+    var quotient = 0u;
+    // 2.2-5: restoring division; the remainder stays below d, so doubling it fits 32 bits.
+    for (var step = 0u; step < 16u; step++) {
+        quotient <<= 1u;
+        if (remainder >= d) {
+            remainder -= d;
+            quotient |= 1u;
+        }
+        remainder <<= 1u;
+    }
+    return quotient;
+}
+
+// x limited to -bound ..= bound (2.2-6).
+fn clamp_magnitude(x: i32, bound: i32) -> i32 {
+    // 2.2-6: bounds are positive, so their negation exists.
+    return max(min(x, bound), -bound);
+}
+
+// 2^31 * 2^fraction for a Q20 fraction below one: the mantissa, in [2^31, 2^32) (2.3-1).
+fn exp2_q31(fraction_q20: u32) -> u32 {
+    let entry = EXP2_Q31[(fraction_q20 >> 12u) & 0xffu];
+    // 2.3-1: y = x + x^2/2 of the 12 low bits; x < 2^-8.5, so the cubic term is below 2^-28.
+    let x_q40 = (fraction_q20 & 0xfffu) * LN2_Q20;
+    let x_q24 = x_q40 >> 16u;
+    let y_q40 = x_q40 + ((x_q24 * x_q24) >> 9u);
+    return entry + (product_high(entry, y_q40) >> 8u);
+}
+
+// The binary32 nearest to mantissa * 2^(exponent - 31), halves away from zero (2.4-1).
+fn assemble_binary32(mantissa: u32, exponent: i32) -> u32 {
+    if (mantissa == 0u) {
+        return 0u;
+    }
+    // 2.4-1: bring the leading one to bit 31.
+    let shift = countLeadingZeros(mantissa);
+    let normal = mantissa << shift;
+    // 2.4-2: 24 bits, halves up; a carry out of them moves the exponent by itself.
+    let rounded = (normal >> 8u) + ((normal >> 7u) & 1u);
+    let biased = exponent - i32(shift) + 126;
+    let bits = (biased << 23u) + i32(rounded);
+    // 2.4-3: biased is one less than the stored exponent, because rounded carries the leading one.
+    if (biased < 0) {
+        return 0u;
+    }
+    if (biased > 253 || bits > i32(BINARY32_MAX)) {
+        return BINARY32_MAX;
+    }
+    return u32(bits);
+}

@@ -1,0 +1,25 @@
+// The file as 32-bit words (chapter 1). Twin: decoder-core/src/words.rs.
+//
+// All files stand in one buffer; word numbers in a Material already count from its begin.
+
+@group(0) @binding(0) var<storage, read> files: array<u32>;
+
+// The word at `index`; zero outside the file, which no checked file asks for (1.2-1).
+fn word(index: u32) -> u32 {
+    return files[index];
+}
+
+// The signed 16-bit number `index` of a packed table that begins at word `start`; even ones are low (1.2-2).
+fn packed_i16(start: u32, index: u32) -> i32 {
+    let pair = word(start + (index >> 1u));
+    // 1.2-2: shift the wanted half to the top, then back with its sign.
+    return i32(pair << (16u - ((index & 1u) << 4u))) >> 16u;
+}
+
+// 32 bits that begin at bit `bit` of the stream at word `start`, lowest bit first (1.2-3).
+fn bit_window(start: u32, bit: u32) -> u32 {
+    let index = start + (bit >> 5u);
+    let shift = bit & 31u;
+    // 1.2-3: the second word is shifted in two steps, since a shift by 32 has no common meaning.
+    return (word(index) >> shift) | ((word(index + 1u) << 1u) << (31u - shift));
+}
