@@ -204,23 +204,26 @@ pub fn locate_on_hull(words: Words<'_>, start: u32, direction: Direction) -> Tap
     let py = direction.y_q14;
     let hull = hull_start(words, start);
     let hull_count = word(words, start.wrapping_add(2));
-    let mut corner = 0u32;
-    let mut past_previous = false;
-    let mut edge = 0u32;
-    // 5.7-1: the last edge is looked at first, so that the first knows what precedes it.
-    if hull_count > 0 {
-        past_previous = hull_edge_position(words, start, hull_count.wrapping_sub(1), px, py) == 2;
+    // 5.7-4: a set of one direction has no hull.
+    if hull_count == 0 {
+        return beyond_hull(words, start, direction, 0, 0, 0);
     }
+    // 5.7-1: the last edge is looked at first, so that the first knows what precedes it.
+    let last = word(words, hull.wrapping_add(hull_count.wrapping_sub(1).wrapping_mul(2))) & 0xffff;
+    let mut first = word(words, hull);
+    let mut a = first & 0xffff;
+    let mut ax = point_x_q14(words, start, a);
+    let mut ay = point_y_q14(words, start, a);
+    let mut past_previous = edge_position(point_x_q14(words, start, last), point_y_q14(words, start, last), ax, ay, px, py) == 2;
+    let mut corner = a;
+    let mut edge = 0u32;
     while edge < hull_count {
-        let first = word(words, hull.wrapping_add(edge.wrapping_mul(2)));
-        let a = first & 0xffff;
         let next = if edge.wrapping_add(1) < hull_count { edge.wrapping_add(1) } else { 0 };
-        let b = word(words, hull.wrapping_add(next.wrapping_mul(2))) & 0xffff;
-        let ax = point_x_q14(words, start, a);
-        let ay = point_y_q14(words, start, a);
+        let second = word(words, hull.wrapping_add(next.wrapping_mul(2)));
+        let b = second & 0xffff;
         let bx = point_x_q14(words, start, b);
         let by = point_y_q14(words, start, b);
-        let position = hull_edge_position(words, start, edge, px, py);
+        let position = edge_position(ax, ay, bx, by, px, py);
         // 5.7-2: the foot of the perpendicular lies on this edge and the point is not inside of it.
         if position == 1 && cross(ax, ay, bx, by, px, py) <= 0 {
             let along = dot_product(ax, ay, bx, by, px, py);
@@ -230,15 +233,16 @@ pub fn locate_on_hull(words: Words<'_>, start: u32, direction: Direction) -> Tap
         }
         // 5.7-3: between two edges: past the end of the one, before the begin of the other.
         if past_previous && position == 0 {
-            corner = edge;
+            corner = a;
         }
         past_previous = position == 2;
+        first = second;
+        a = b;
+        ax = bx;
+        ay = by;
         edge = edge.wrapping_add(1);
     }
-    let at = word(words, hull.wrapping_add(corner.wrapping_mul(2))) & 0xffff;
-    // 5.7-4: a set of one direction has no hull.
-    let only = if hull_count > 0 { at } else { 0 };
-    beyond_hull(words, start, direction, only, only, 0)
+    beyond_hull(words, start, direction, corner, corner, 0)
 }
 
 /// Dot product of `a` to `b` with `a` to `p` (5.7-1).
@@ -251,19 +255,10 @@ pub fn dot_product(ax: i32, ay: i32, bx: i32, by: i32, px: i32, py: i32) -> i32 
     first.wrapping_add(second)
 }
 
-/// 0 if the foot of the perpendicular from the point lies before hull edge `edge`, 1 on it, 2 past it (5.7-1).
+/// 0 if the foot of the perpendicular from `p` lies before the edge `a` to `b`, 1 on it, 2 past it (5.7-1).
 ///
-/// Both ends count as on it, except that a foot at the begin belongs to the edge before as well.
-pub fn hull_edge_position(words: Words<'_>, start: u32, edge: u32, px: i32, py: i32) -> u32 {
-    let hull = hull_start(words, start);
-    let hull_count = word(words, start.wrapping_add(2));
-    let next = if edge.wrapping_add(1) < hull_count { edge.wrapping_add(1) } else { 0 };
-    let a = word(words, hull.wrapping_add(edge.wrapping_mul(2))) & 0xffff;
-    let b = word(words, hull.wrapping_add(next.wrapping_mul(2))) & 0xffff;
-    let ax = point_x_q14(words, start, a);
-    let ay = point_y_q14(words, start, a);
-    let bx = point_x_q14(words, start, b);
-    let by = point_y_q14(words, start, b);
+/// Both ends count as on it.
+pub fn edge_position(ax: i32, ay: i32, bx: i32, by: i32, px: i32, py: i32) -> u32 {
     // 5.7-1: measured from both ends, so that no squared length is needed.
     if dot_product(ax, ay, bx, by, px, py) < 0 {
         return 0;

@@ -5,6 +5,7 @@ use crate::ensemble::{LOW_BITS_BITS, SHIFT_BIAS, SHIFT_BITS};
 use crate::error::Rule;
 use crate::header::Header;
 use crate::material::level_size;
+use crate::stream::{Ones, window};
 use crate::words::{Words, word};
 
 /// Most dictionaries of an ensemble (10.1-2).
@@ -127,17 +128,6 @@ pub(crate) fn check_atoms(check: &mut Check<'_, '_>, section: Section, angular: 
     sound
 }
 
-/// Up to 57 bits of a stream from `bit` on; zero beyond its end.
-#[inline(always)]
-fn window(stream: &[u8], bit: u32) -> u64 {
-    let from = (bit >> 3) as usize;
-    match stream.get(from..) {
-        Some([a, b, c, d, e, f, g, h, ..]) => u64::from_le_bytes([*a, *b, *c, *d, *e, *f, *g, *h]) >> (bit & 7),
-        Some(rest) => rest.iter().rev().fold(0u64, |bits, &byte| bits << 8 | byte as u64) >> (bit & 7),
-        None => 0,
-    }
-}
-
 /// What the records of a section are read by.
 struct Stream<'a> {
     bytes: &'a [u8],
@@ -233,39 +223,32 @@ fn check_record(check: &mut Check<'_, '_>, stream: &Stream<'_>, bit: u32, stream
     let (low_mask, value_mask) = (mask(low_bits) as u32, mask(stream.value_bits) as u32);
     let half = (1u32 << stream.value_bits) >> 1;
     let mut field_bit = fields as u32;
-    let mut base = highs as u32;
+    let mut ones = Ones::new(stream.bytes, highs as u32, stream.bits);
     let mut sum = 0u32;
     let mut ascends = true;
     let mut next = 0u32;
     let mut index = 0u32;
-    let mut end = base;
-    while index < count && base < stream.bits {
-        // 48 bits of the high parts at a time; each one bit is a coefficient.
-        let left = stream.bits - base;
-        let mut ones = window(stream.bytes, base) & mask(left.min(48));
-        while ones != 0 && index < count {
-            let place = base + ones.trailing_zeros();
-            ones &= ones - 1;
-            end = place + 1;
-            let high = place - highs as u32 - index;
-            let field = window(stream.bytes, field_bit) as u32;
-            field_bit += field_bits;
-            // A high part beyond all atoms must not wrap back to one.
-            let position = if high < ATOM_LIMIT { high << low_bits | field & low_mask } else { u32::MAX };
-            let Some(&[a, _, _, _, b0, b1, s0, s1]) = list.get(position as usize) else {
-                check.find(Rule::RecordPositions, at, position);
-                return None;
-            };
-            ascends &= position >= next;
-            next = position + 1;
-            let step = u16::from_le_bytes([s0, s1]) as u32;
-            let value = (field >> low_bits) & value_mask;
-            let coefficient = i16::from_le_bytes([b0, b1]) as i32 + ((value * step + half) >> stream.value_bits) as i32;
-            let atom_shift = a & 0xf;
-            sum += (coefficient.unsigned_abs() + (1 << atom_shift) - 1) >> atom_shift;
-            index += 1;
-        }
-        base += 48;
+    let mut end = highs as u32;
+    while index < count {
+        let Some(place) = ones.next() else { break };
+        end = place + 1;
+        let high = place - highs as u32 - index;
+        let field = window(stream.bytes, field_bit) as u32;
+        field_bit += field_bits;
+        // A high part beyond all atoms must not wrap back to one.
+        let position = if high < ATOM_LIMIT { high << low_bits | field & low_mask } else { u32::MAX };
+        let Some(&[a, _, _, _, b0, b1, s0, s1]) = list.get(position as usize) else {
+            check.find(Rule::RecordPositions, at, position);
+            return None;
+        };
+        ascends &= position >= next;
+        next = position + 1;
+        let step = u16::from_le_bytes([s0, s1]) as u32;
+        let value = (field >> low_bits) & value_mask;
+        let coefficient = i16::from_le_bytes([b0, b1]) as i32 + ((value * step + half) >> stream.value_bits) as i32;
+        let atom_shift = a & 0xf;
+        sum += (coefficient.unsigned_abs() + (1 << atom_shift) - 1) >> atom_shift;
+        index += 1;
     }
     if !check.ensure(index == count, Rule::RecordPlace, at, bit) || !check.ensure(ascends, Rule::RecordPositions, at, bit) {
         return None;

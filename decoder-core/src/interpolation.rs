@@ -47,17 +47,16 @@ pub fn mean_q20(words: Words<'_>, material: &Material, channel: Channel, light: 
     round_shift(blended_q15, 15u32.wrapping_sub(word(words, start.wrapping_add(1)))).wrapping_add(base_q20)
 }
 
-/// A texture times the scale of a pair of directions, Q20 (8.2).
-pub fn scaled_q20(words: Words<'_>, material: &Material, channel: Channel, light: Taps, view: Taps, texture: i32) -> i32 {
-    let start = channel.scale_start;
-    // 8.2-1: a channel without scales keeps its texture.
-    if start == 0 {
-        return texture;
-    }
-    let scale_q15 = round_shift(blend_table_q15(words, start, material.light_count, light, view), 15);
-    let shift = word(words, start.wrapping_add(1));
+/// The scale of a channel for a pair of directions, Q15 (8.2-1).
+pub fn scale_q15(words: Words<'_>, material: &Material, channel: Channel, light: Taps, view: Taps) -> i32 {
+    // 8.2-1: blended like the means, to 16 bits.
+    round_shift(blend_table_q15(words, channel.scale_start, material.light_count, light, view), 15)
+}
+
+/// A texture times a scale of `2^shift` units, Q20 (8.2-2).
+pub fn scale_texture(texture: i32, scale: i32, shift: u32) -> i32 {
     // 8.2-2: limited before the shift, so that nothing is lost above.
-    clamp_magnitude(multiply_q15(texture, scale_q15), VALUE_BOUND >> shift) << shift
+    clamp_magnitude(multiply_q15(texture, scale), VALUE_BOUND >> shift) << shift
 }
 
 /// The value of a channel at one level, Q20 (8.3).
@@ -71,10 +70,14 @@ pub fn channel_q20(words: Words<'_>, material: &Material, channel: Channel, leve
     if channel.state != CHANNEL_FULL {
         return clamp_magnitude(mean, VALUE_BOUND);
     }
-    let texture = texture_q20(words, material, channel, level, x, y, light, view);
-    let scaled = scaled_q20(words, material, channel, light, view, texture);
+    let mut texture = texture_q20(words, material, channel, level, x, y, light, view);
+    // 8.2-3: a channel without scales keeps its texture.
+    if channel.scale_start != 0 {
+        let scale = scale_q15(words, material, channel, light, view);
+        texture = scale_texture(texture, scale, word(words, channel.scale_start.wrapping_add(1)));
+    }
     // 8.3-3: each part is within 2^30, so their sum is exact.
-    clamp_magnitude(scaled.wrapping_add(mean), VALUE_BOUND)
+    clamp_magnitude(texture.wrapping_add(mean), VALUE_BOUND)
 }
 
 /// The values of all channels at one level (8.3).

@@ -41,8 +41,8 @@
 #[cfg(test)]
 extern crate std;
 
-//#[cfg(feature = "batch")]
-//pub mod batch;
+#[cfg(feature = "batch")]
+pub mod batch;
 mod check;
 pub mod colour;
 pub mod cost;
@@ -56,8 +56,8 @@ pub mod error;
 mod exp2_table;
 pub mod fixed;
 pub mod header;
-//#[cfg(feature = "batch")]
-//pub mod image;
+#[cfg(feature = "batch")]
+pub mod image;
 pub mod interpolation;
 pub mod limits;
 pub mod material;
@@ -65,8 +65,11 @@ pub mod metadata;
 mod open;
 pub mod pair_table;
 pub mod position;
+#[cfg(feature = "batch")]
+mod records;
 pub mod result;
 mod sha256;
+mod stream;
 pub mod words;
 
 pub use check::Section;

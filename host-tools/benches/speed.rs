@@ -1,1 +1,127 @@
-fn main(){}
+//! Speed of the decoder on one core, after its answers were checked.
+//!
+//!     RUSTFLAGS="-C target-cpu=x86-64-v3" cargo bench -p selvedge-tools --bench speed
+//!
+//! With `SELVEDGE_DATA` the full 400 x 400 material is measured, without it the excerpt in the repository.
+
+use selvedge::batch::FilteredQuery;
+use selvedge::{Direction, Limits, Rgb, Selvedge};
+use selvedge_tools::random::Random;
+use selvedge_tools::{sparsebtf, write};
+use std::hint::black_box;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Runs of each measurement; the median is printed with the range.
+const RUNS: usize = 9;
+
+/// Median, least and most of what a second does, given what one run does.
+fn rate(per_run: f64, mut run: impl FnMut()) -> String {
+    run();
+    let mut rates: Vec<f64> = (0..RUNS)
+        .map(|_| {
+            let begin = Instant::now();
+            run();
+            per_run / begin.elapsed().as_secs_f64()
+        })
+        .collect();
+    rates.sort_by(f64::total_cmp);
+    format!("{:9.3} M/s  (range {:.3} to {:.3})", rates[RUNS / 2] / 1e6, rates[0] / 1e6, rates[RUNS - 1] / 1e6)
+}
+
+fn direction(random: &mut Random) -> Direction {
+    // Uniform over the hemisphere.
+    let unit = |word: u32| word as f32 / 4_294_967_296.0;
+    let (z, azimuth) = (unit(random.word()), unit(random.word()) * std::f32::consts::TAU);
+    let r = (1.0 - z * z).max(0.0).sqrt();
+    Direction::from_unit_vector([r * azimuth.cos(), r * azimuth.sin(), z])
+}
+
+fn mean_operations(material: &Selvedge<'_>) -> String {
+    format!("{} operations a sample at worst", material.header().operations)
+}
+
+fn main() {
+    // Cargo passes --bench; run as a test, there is nothing to do.
+    if std::env::args().any(|argument| argument == "--test") {
+        return;
+    }
+    let (folder, size) = match std::env::var_os("SELVEDGE_DATA") {
+        Some(data) => (PathBuf::from(data).join("sparsebtf"), None),
+        None => (Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/sparsebtf"), None),
+    };
+    println!("target features: avx2 {}, data {}", cfg!(target_feature = "avx2"), folder.display());
+    let authors = sparsebtf::read_material(&folder, "carpet07", size).expect("data");
+    let bytes = write::write_material(&authors.to_model(10).expect("model"));
+    let material = selvedge::open(&bytes, &Limits::default()).expect("legal");
+    println!("{} bytes, {}", bytes.len(), mean_operations(&material));
+
+    let mut random = Random::new(7);
+    let queries: Vec<FilteredQuery> = (0..1 << 16)
+        .map(|_| FilteredQuery { u_q32: random.word(), v_q32: random.word(), light: direction(&mut random), view: direction(&mut random) })
+        .collect();
+    let mut scratch = vec![0; material.batch_scratch_len(queries.len())];
+    let mut out = vec![Rgb::default(); queries.len()];
+    material.sample_batch(&queries, &mut scratch, &mut out).expect("buffers fit");
+    let plain = |query: &FilteredQuery| material.filtered(query.u_q32, query.v_q32, query.light, query.view);
+    for (query, rgb) in queries.iter().zip(&out) {
+        assert_eq!(plain(query), *rgb, "the batch is not the plain path");
+    }
+    let count = queries.len() as f64;
+    println!("filtered, 2 x 64 coefficients, one by one     {}", rate(count / 8.0, || {
+        for query in &queries[..queries.len() / 8] {
+            black_box(plain(query));
+        }
+    }));
+    println!("filtered, 2 x 64 coefficients, batch of {}  {}", queries.len(), rate(count, || {
+        material.sample_batch(&queries, &mut scratch, &mut out).expect("buffers fit");
+        black_box(&out);
+    }));
+    println!("two directions located                         {}", rate(count, || {
+        for query in &queries {
+            black_box((material.locate_light(query.light), material.locate_view(query.view)));
+        }
+    }));
+
+    let [width, height] = material.image_size(0);
+    let texels = (width * height) as usize;
+    let mut scratch = vec![0; material.image_scratch_len()];
+    let mut values = vec![0; texels];
+    let (light, view) = (queries[0].light, queries[0].view);
+    let taps = (material.locate_light(light), material.locate_view(view));
+    for channel in [1, 2] {
+        material.decode_channel(channel, 0, light, view, &mut scratch, &mut values).expect("buffers fit");
+        for (i, value) in values.iter().enumerate() {
+            let (x, y) = (i as u32 % width, i as u32 / width);
+            let whole = selvedge::interpolation::texel_values(material.words(), material.material(), x, y, taps.0, taps.1);
+            assert_eq!([whole.c0, whole.c1, whole.c2][channel], *value, "the image is not the plain path");
+        }
+    }
+    println!("whole image, channel texels (two channels)     {}", rate(2.0 * texels as f64, || {
+        for channel in [1, 2] {
+            material.decode_channel(channel, 0, light, view, &mut scratch, &mut values).expect("buffers fit");
+        }
+        black_box(&values);
+    }));
+    let mut image = vec![Rgb::default(); texels];
+    println!("whole image, RGB texels                        {}", rate(texels as f64, || {
+        material.decode_image(0, light, view, &mut scratch, &mut image).expect("buffers fit");
+        black_box(&image);
+    }));
+
+    // A file of about 5 MB: the same records over a larger image, coefficients twice over.
+    let mut model = authors.to_model(10).expect("model");
+    let repeat = (5_000_000 / bytes.len().min(900_000)) as u32;
+    model.size[1] *= repeat;
+    for ensemble in model.channels.iter_mut().filter_map(|channel| channel.ensemble.as_mut()) {
+        let records = &mut ensemble.coefficients[0][0].records;
+        let once = records.clone();
+        (1..repeat).for_each(|_| records.extend(once.iter().cloned()));
+    }
+    let large = write::write_material(&model);
+    selvedge::open(&large, &Limits::NONE).expect("legal");
+    let open = rate(large.len() as f64, || {
+        black_box(selvedge::open(&large, &Limits::NONE)).expect("legal");
+    });
+    println!("open, bytes of a file of {} bytes          {}", large.len(), open);
+}

@@ -188,24 +188,27 @@ fn locate_on_hull(start: u32, direction: Direction) -> Taps {
     let py = direction.y_q14;
     let hull = hull_start(start);
     let hull_count = word(start + 2u);
-    var corner = 0u;
-    var past_previous = false;
-    var edge = 0u;
-    // 5.7-1: the last edge is looked at first, so that the first knows what precedes it.
-    if (hull_count > 0u) {
-        past_previous = hull_edge_position(start, hull_count - 1u, px, py) == 2u;
+    // 5.7-4: a set of one direction has no hull.
+    if (hull_count == 0u) {
+        return beyond_hull(start, direction, 0u, 0u, 0);
     }
+    // 5.7-1: the last edge is looked at first, so that the first knows what precedes it.
+    let last = word(hull + (hull_count - 1u) * 2u) & 0xffffu;
+    var first = word(hull);
+    var a = first & 0xffffu;
+    var ax = point_x_q14(start, a);
+    var ay = point_y_q14(start, a);
+    var past_previous = edge_position(point_x_q14(start, last), point_y_q14(start, last), ax, ay, px, py) == 2u;
+    var corner = a;
+    var edge = 0u;
     while (edge < hull_count) {
-        let first = word(hull + edge * 2u);
-        let a = first & 0xffffu;
         // select(if false, if true, condition)
         let next = select(0u, edge + 1u, edge + 1u < hull_count);
-        let b = word(hull + next * 2u) & 0xffffu;
-        let ax = point_x_q14(start, a);
-        let ay = point_y_q14(start, a);
+        let second = word(hull + next * 2u);
+        let b = second & 0xffffu;
         let bx = point_x_q14(start, b);
         let by = point_y_q14(start, b);
-        let position = hull_edge_position(start, edge, px, py);
+        let position = edge_position(ax, ay, bx, by, px, py);
         // 5.7-2: the foot of the perpendicular lies on this edge and the point is not inside of it.
         if (position == 1u && cross(ax, ay, bx, by, px, py) <= 0) {
             let along = dot_product(ax, ay, bx, by, px, py);
@@ -215,15 +218,16 @@ fn locate_on_hull(start: u32, direction: Direction) -> Taps {
         }
         // 5.7-3: between two edges: past the end of the one, before the begin of the other.
         if (past_previous && position == 0u) {
-            corner = edge;
+            corner = a;
         }
         past_previous = position == 2u;
+        first = second;
+        a = b;
+        ax = bx;
+        ay = by;
         edge += 1u;
     }
-    let at = word(hull + corner * 2u) & 0xffffu;
-    // 5.7-4: a set of one direction has no hull. select(if false, if true, condition)
-    let only = select(0u, at, hull_count > 0u);
-    return beyond_hull(start, direction, only, only, 0);
+    return beyond_hull(start, direction, corner, corner, 0);
 }
 
 // Dot product of a to b with a to p (5.7-1).
@@ -234,18 +238,8 @@ fn dot_product(ax: i32, ay: i32, bx: i32, by: i32, px: i32, py: i32) -> i32 {
     return first + second;
 }
 
-// 0 if the foot of the perpendicular from the point lies before hull edge `edge`, 1 on it, 2 past it (5.7-1).
-fn hull_edge_position(start: u32, edge: u32, px: i32, py: i32) -> u32 {
-    let hull = hull_start(start);
-    let hull_count = word(start + 2u);
-    // select(if false, if true, condition)
-    let next = select(0u, edge + 1u, edge + 1u < hull_count);
-    let a = word(hull + edge * 2u) & 0xffffu;
-    let b = word(hull + next * 2u) & 0xffffu;
-    let ax = point_x_q14(start, a);
-    let ay = point_y_q14(start, a);
-    let bx = point_x_q14(start, b);
-    let by = point_y_q14(start, b);
+// 0 if the foot of the perpendicular from p lies before the edge a to b, 1 on it, 2 past it (5.7-1).
+fn edge_position(ax: i32, ay: i32, bx: i32, by: i32, px: i32, py: i32) -> u32 {
     // 5.7-1: measured from both ends, so that no squared length is needed.
     if (dot_product(ax, ay, bx, by, px, py) < 0) {
         return 0u;

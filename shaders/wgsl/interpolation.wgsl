@@ -37,17 +37,16 @@ fn mean_q20(material: Material, channel: Channel, light: Taps, view: Taps) -> i3
     return round_shift(blended_q15, 15u - word(start + 1u)) + base_q20;
 }
 
-// A texture times the scale of a pair of directions, Q20 (8.2).
-fn scaled_q20(material: Material, channel: Channel, light: Taps, view: Taps, texture: i32) -> i32 {
-    let start = channel.scale_start;
-    // 8.2-1: a channel without scales keeps its texture.
-    if (start == 0u) {
-        return texture;
-    }
-    let scale_q15 = round_shift(blend_table_q15(start, material.light_count, light, view), 15u);
-    let shift = word(start + 1u);
+// The scale of a channel for a pair of directions, Q15 (8.2-1).
+fn scale_q15(material: Material, channel: Channel, light: Taps, view: Taps) -> i32 {
+    // 8.2-1: blended like the means, to 16 bits.
+    return round_shift(blend_table_q15(channel.scale_start, material.light_count, light, view), 15u);
+}
+
+// A texture times a scale of 2^shift units, Q20 (8.2-2).
+fn scale_texture(texture: i32, scale: i32, shift: u32) -> i32 {
     // 8.2-2: limited before the shift, so that nothing is lost above.
-    return clamp_magnitude(multiply_q15(texture, scale_q15), VALUE_BOUND >> shift) << shift;
+    return clamp_magnitude(multiply_q15(texture, scale), VALUE_BOUND >> shift) << shift;
 }
 
 // The value of a channel at one level, Q20 (8.3).
@@ -61,10 +60,14 @@ fn channel_q20(material: Material, channel: Channel, level: u32, x: Axis, y: Axi
     if (channel.state != CHANNEL_FULL) {
         return clamp_magnitude(mean, VALUE_BOUND);
     }
-    let texture = texture_q20(material, channel, level, x, y, light, view);
-    let scaled = scaled_q20(material, channel, light, view, texture);
+    var texture = texture_q20(material, channel, level, x, y, light, view);
+    // 8.2-3: a channel without scales keeps its texture.
+    if (channel.scale_start != 0u) {
+        let scale = scale_q15(material, channel, light, view);
+        texture = scale_texture(texture, scale, word(channel.scale_start + 1u));
+    }
     // 8.3-3: each part is within 2^30, so their sum is exact.
-    return clamp_magnitude(scaled + mean, VALUE_BOUND);
+    return clamp_magnitude(texture + mean, VALUE_BOUND);
 }
 
 // The values of all channels at one level (8.3).

@@ -1,0 +1,370 @@
+//! Batches of filtered samples: the same bits as one at a time, with the work of a block shared.
+//!
+//! Queries are sorted by block. A record is unpacked once for all of them, the columns that it uses are
+//! blended for eight queries side by side, and each coefficient then costs two vector products.
+//! Plain arrays of eight numbers: a compiler makes vector instructions of them where there are any.
+
+use crate::colour::{Rgb, Values};
+use crate::direction::{Direction, Taps};
+use crate::ensemble::Record;
+use crate::fixed::{HALF_Q15, clamp_magnitude, multiply_q15, round_shift};
+use crate::interpolation::{VALUE_BOUND, mean_q20, radiance, scale_q15, scale_texture};
+use crate::material::{CHANNEL_FULL, CHANNEL_MISSING, Channel};
+use crate::open::Selvedge;
+use crate::position::{Axis, Span, axis_at_position, block_count};
+use crate::records::{Table, entry, for_each_coefficient, record_of};
+use crate::result::BufferTooSmall;
+use crate::words::word;
+
+/// A filtered sample to be made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FilteredQuery {
+    /// u0.32 fraction of the image along x.
+    pub u_q32: u32,
+    /// u0.32 fraction of the image along y.
+    pub v_q32: u32,
+    /// Light direction.
+    pub light: Direction,
+    /// View direction.
+    pub view: Direction,
+}
+
+/// Queries side by side.
+const LANES: usize = 8;
+/// One number for each of them.
+type Lanes = [i32; LANES];
+/// Most columns that an atom can name in a factor.
+const COLUMNS: usize = 1024;
+/// Words kept of a query: taps of light and view, textures of three channels.
+const QUERY_WORDS: usize = 10;
+/// Words kept of a query's part in a block: query, rows, weights along x and y.
+const ITEM_WORDS: usize = 4;
+/// Words kept of an unpacked coefficient: value, and its atom with columns numbered within the record.
+const COEFFICIENT_WORDS: usize = 2;
+
+/// Taps in three words: indices below 1,024, weights and cosine up to 2^15; the third weight is what is left.
+fn pack_taps(taps: Taps) -> [i32; 3] {
+    let pair = |low: u32, high: u32| (low | high << 16) as i32;
+    [pair(taps.a, taps.b), pair(taps.c, taps.cosine_q15 as u32), pair(taps.weight_a_q15 as u32, taps.weight_b_q15 as u32)]
+}
+
+fn unpack_taps([ab, c, weights]: [i32; 3]) -> Taps {
+    let (low, high) = (|word: i32| word as u32 & 0xffff, |word: i32| word as u32 >> 16);
+    let (weight_a, weight_b) = (low(weights) as i32, high(weights) as i32);
+    let weight_c = 32_768i32.wrapping_sub(weight_a).wrapping_sub(weight_b);
+    Taps { a: low(ab), b: high(ab), c: low(c), weight_a_q15: weight_a, weight_b_q15: weight_b, weight_c_q15: weight_c, cosine_q15: high(c) as i32 }
+}
+
+/// Scratch of one record: columns that it uses, numbered in the order of their first use.
+struct Workspace<'s> {
+    /// Number within the record of each light and view column, valid where `seen` holds the record's mark.
+    numbers: &'s mut [i32],
+    /// Mark of the record that last used a column.
+    seen: &'s mut [i32],
+    /// Columns in the order of their numbers.
+    columns: &'s mut [i32],
+    /// Blended columns, lane by lane: light ones, then view ones.
+    blended: &'s mut [Lanes],
+    /// Unpacked coefficients.
+    coefficients: &'s mut [[i32; COEFFICIENT_WORDS]],
+}
+
+/// What a record uses.
+struct Unpacked {
+    count: usize,
+    lights: usize,
+    views: usize,
+}
+
+impl Workspace<'_> {
+    /// The number of a column of the light (`side` 0) or view (`side` 1) within the record marked `mark`.
+    #[inline(always)]
+    fn number(&mut self, side: usize, column: u32, mark: i32, used: &mut usize) -> u32 {
+        let at = side.wrapping_mul(COLUMNS).wrapping_add(column as usize & (COLUMNS - 1));
+        let (Some(seen), Some(number)) = (self.seen.get_mut(at), self.numbers.get_mut(at)) else { return 0 };
+        if *seen != mark {
+            *seen = mark;
+            *number = *used as i32;
+            if let Some(slot) = self.columns.get_mut(side.wrapping_mul(COLUMNS).wrapping_add(*used)) {
+                *slot = column as i32;
+            }
+            *used = used.wrapping_add(1);
+        }
+        *number as u32
+    }
+}
+
+impl Selvedge<'_> {
+    /// Words of scratch that [`Selvedge::sample_batch`] needs for `count` queries.
+    pub fn batch_scratch_len(&self, count: usize) -> usize {
+        let material = self.material();
+        let blocks = block_count(material, material.width) as usize * block_count(material, material.height) as usize;
+        count * (QUERY_WORDS + 4 * ITEM_WORDS) + blocks + 1 + 6 * COLUMNS + 2 * COLUMNS * LANES + self.largest_record() * COEFFICIENT_WORDS
+    }
+
+    /// Coefficients of the largest record of level 0.
+    fn largest_record(&self) -> usize {
+        let (words, material) = (self.words(), self.material());
+        let full = material.channels.iter().filter(|channel| channel.state == CHANNEL_FULL);
+        let stated = |channel: &Channel, layer: u32| word(words, crate::ensemble::coefficients_start(words, material, *channel, 0, layer).wrapping_add(3));
+        full.flat_map(|channel| (0..material.layer_count).map(move |layer| stated(channel, layer))).max().unwrap_or(0) as usize
+    }
+
+    /// Radiance of many filtered samples: `out[i]` equals [`Selvedge::filtered`] of `queries[i]`, bit for bit.
+    ///
+    /// The more queries at once, the more of them share a block; tens of thousands are a good batch.
+    ///
+    /// # Errors
+    /// If `out` is shorter than `queries`, or `scratch` than [`Selvedge::batch_scratch_len`].
+    pub fn sample_batch(&self, queries: &[FilteredQuery], scratch: &mut [i32], out: &mut [Rgb]) -> Result<(), BufferTooSmall> {
+        if out.len() < queries.len() {
+            return Err(BufferTooSmall { needed: queries.len(), lent: out.len() });
+        }
+        let needed = self.batch_scratch_len(queries.len());
+        let lent = scratch.len();
+        let parts = self.split_scratch(queries.len(), scratch);
+        let Some((states, items, starts, mut workspace)) = parts else {
+            return Err(BufferTooSmall { needed, lent });
+        };
+        self.locate_all(queries, states);
+        let used = self.sort_by_block(queries, items, starts);
+        workspace.seen.fill(0);
+        let mut mark = 0i32;
+        for (number, &channel) in self.material().channels.iter().enumerate() {
+            if channel.state != CHANNEL_FULL {
+                continue;
+            }
+            let mut begin = 0usize;
+            for (block, &end) in (0u32..).zip(starts.iter()) {
+                let end = (end as usize).min(used);
+                let in_block = items.get(begin..end).unwrap_or(&[]);
+                begin = end;
+                for layer in 0..self.material().layer_limit {
+                    if in_block.is_empty() {
+                        break;
+                    }
+                    let record = record_of(self.words(), self.material(), channel, 0, layer, block);
+                    if record.count > 0 {
+                        mark = mark.wrapping_add(1);
+                        self.sample_record(channel, number, &record, mark, in_block, states, &mut workspace);
+                    }
+                }
+            }
+        }
+        for (state, rgb) in states.iter().zip(out) {
+            *rgb = self.finish(state);
+        }
+        Ok(())
+    }
+
+    /// Cuts the scratch into its parts; `None` if it is too short.
+    fn split_scratch<'s>(&self, count: usize, scratch: &'s mut [i32]) -> Option<(&'s mut [[i32; QUERY_WORDS]], &'s mut [[i32; ITEM_WORDS]], &'s mut [i32], Workspace<'s>)> {
+        let material = self.material();
+        let blocks = block_count(material, material.width) as usize * block_count(material, material.height) as usize;
+        let (states, rest) = scratch.split_at_mut_checked(count * QUERY_WORDS)?;
+        let (items, rest) = rest.split_at_mut_checked(count * 4 * ITEM_WORDS)?;
+        let (starts, rest) = rest.split_at_mut_checked(blocks + 1)?;
+        let (numbers, rest) = rest.split_at_mut_checked(2 * COLUMNS)?;
+        let (seen, rest) = rest.split_at_mut_checked(2 * COLUMNS)?;
+        let (columns, rest) = rest.split_at_mut_checked(2 * COLUMNS)?;
+        let (blended, rest) = rest.split_at_mut_checked(2 * COLUMNS * LANES)?;
+        let (coefficients, _) = rest.split_at_mut_checked(self.largest_record() * COEFFICIENT_WORDS)?;
+        let workspace = Workspace { numbers, seen, columns, blended: blended.as_chunks_mut().0, coefficients: coefficients.as_chunks_mut().0 };
+        Some((states.as_chunks_mut().0, items.as_chunks_mut().0, starts, workspace))
+    }
+
+    fn locate_all(&self, queries: &[FilteredQuery], states: &mut [[i32; QUERY_WORDS]]) {
+        for (query, state) in queries.iter().zip(states) {
+            let [l0, l1, l2] = pack_taps(self.locate_light(query.light));
+            let [v0, v1, v2] = pack_taps(self.locate_view(query.view));
+            *state = [l0, l1, l2, v0, v1, v2, 0, 0, 0, 0];
+        }
+    }
+
+    /// A counting sort of the queries' parts by block: afterwards `starts[b]` is the end of block `b`. Gives the parts.
+    fn sort_by_block(&self, queries: &[FilteredQuery], items: &mut [[i32; ITEM_WORDS]], starts: &mut [i32]) -> usize {
+        let material = self.material();
+        let blocks_x = block_count(material, material.width);
+        let axes = |query: &FilteredQuery| {
+            let axis = |size: u32, position: u32| axis_at_position(material.edge, material.edge_reciprocal_q18, size, position);
+            (axis(material.width, query.u_q32), axis(material.height, query.v_q32))
+        };
+        let spans = |axis: Axis| [Some(axis.first), (axis.count == 2).then_some(axis.second)].into_iter().flatten();
+        let block_at = |x: Span, y: Span| y.block.wrapping_mul(blocks_x).wrapping_add(x.block) as usize;
+        starts.fill(0);
+        for query in queries {
+            let (x_axis, y_axis) = axes(query);
+            for y in spans(y_axis) {
+                for x in spans(x_axis) {
+                    if let Some(count) = starts.get_mut(block_at(x, y)) {
+                        *count = count.wrapping_add(1);
+                    }
+                }
+            }
+        }
+        let mut total = 0i32;
+        for start in starts.iter_mut() {
+            let count = *start;
+            *start = total;
+            total = total.wrapping_add(count);
+        }
+        for (number, query) in (0i32..).zip(queries) {
+            let (x_axis, y_axis) = axes(query);
+            for y in spans(y_axis) {
+                for x in spans(x_axis) {
+                    let Some(place) = starts.get_mut(block_at(x, y)) else { continue };
+                    let rows = x.row_a | x.row_b << 8 | y.row_a << 16 | y.row_b << 24;
+                    let weights = |span: Span| span.weight_a_q15 | span.weight_b_q15 << 16;
+                    if let Some(item) = items.get_mut(*place as usize) {
+                        *item = [number, rows as i32, weights(x), weights(y)];
+                    }
+                    *place = place.wrapping_add(1);
+                }
+            }
+        }
+        total as usize
+    }
+
+    /// Unpacks a record and numbers the columns that it uses.
+    #[inline(always)]
+    fn unpack(&self, channel: Channel, record: &Record, mark: i32, workspace: &mut Workspace<'_>) -> Unpacked {
+        let mut unpacked = Unpacked { count: 0, lights: 0, views: 0 };
+        for_each_coefficient(self.words(), channel, record, |c| {
+            let light = workspace.number(0, (c.atom >> 14) & 0x3ff, mark, &mut unpacked.lights);
+            let view = workspace.number(1, (c.atom >> 4) & 0x3ff, mark, &mut unpacked.views);
+            if let Some(slot) = workspace.coefficients.get_mut(unpacked.count) {
+                *slot = [c.value, (c.atom & 0xff00_000f | light << 14 | view << 4) as i32];
+            }
+            unpacked.count = unpacked.count.wrapping_add(1);
+        });
+        unpacked
+    }
+
+    /// Adds what a record gives to the textures of the queries that meet its block.
+    #[inline(always)]
+    fn sample_record(&self, channel: Channel, number: usize, record: &Record, mark: i32, items: &[[i32; ITEM_WORDS]], states: &mut [[i32; QUERY_WORDS]], workspace: &mut Workspace<'_>) {
+        let words = self.words();
+        let unpacked = self.unpack(channel, record, mark, workspace);
+        let tables = [0, 1].map(|which| Table::new(words, channel.angular_start, record.dictionary, which));
+        let spatial = [0, 1].map(|which| Table::new(words, channel.spatial_start, record.dictionary, which));
+        let (light_lanes, view_lanes) = workspace.blended.split_at_mut(COLUMNS.min(workspace.blended.len()));
+        let (light_columns, view_columns) = workspace.columns.split_at(COLUMNS.min(workspace.columns.len()));
+        let light_columns = light_columns.get(..unpacked.lights).unwrap_or(&[]);
+        let view_columns = view_columns.get(..unpacked.views).unwrap_or(&[]);
+        let coefficients = workspace.coefficients.get(..unpacked.count).unwrap_or(&[]);
+        for group in items.chunks(LANES) {
+            let mut x_spans = [Span::default(); LANES];
+            let mut y_spans = [Span::default(); LANES];
+            for (lane, item) in group.iter().enumerate() {
+                let state = states.get(item[0] as usize).copied().unwrap_or_default();
+                let [l0, l1, l2, v0, v1, v2, ..] = state;
+                blend_lane(tables[0], unpack_taps([l0, l1, l2]), light_columns, light_lanes, lane);
+                blend_lane(tables[1], unpack_taps([v0, v1, v2]), view_columns, view_lanes, lane);
+                let rows = item[1] as u32;
+                let span = |rows: u32, weights: i32| Span {
+                    block: 0,
+                    row_a: rows & 0xff,
+                    row_b: (rows >> 8) & 0xff,
+                    weight_a_q15: weights & 0xffff,
+                    weight_b_q15: (weights as u32 >> 16) as i32,
+                };
+                x_spans[lane & 7] = span(rows, item[2]);
+                y_spans[lane & 7] = span(rows >> 16, item[3]);
+            }
+            let total = sum_lanes(coefficients, light_lanes, view_lanes, |x| blend_spans(spatial[0], &x_spans, x), |y| blend_spans(spatial[1], &y_spans, y));
+            for (item, total) in group.iter().zip(total) {
+                if let Some(sum) = states.get_mut(item[0] as usize).and_then(|state| state.get_mut(number.wrapping_add(6))) {
+                    *sum = sum.wrapping_add(round_shift(total, record.shift));
+                }
+            }
+        }
+    }
+
+    /// Means, scales and colour of a query whose textures are summed.
+    fn finish(&self, state: &[i32; QUERY_WORDS]) -> Rgb {
+        let (words, material) = (self.words(), self.material());
+        let [l0, l1, l2, v0, v1, v2, t0, t1, t2, _] = *state;
+        let (light, view) = (unpack_taps([l0, l1, l2]), unpack_taps([v0, v1, v2]));
+        let value = |channel: Channel, texture: i32| {
+            if channel.state == CHANNEL_MISSING {
+                return 0;
+            }
+            let mut texture = texture;
+            if channel.scale_start != 0 {
+                let scale = scale_q15(words, material, channel, light, view);
+                texture = scale_texture(texture, scale, word(words, channel.scale_start.wrapping_add(1)));
+            }
+            clamp_magnitude(texture.wrapping_add(mean_q20(words, material, channel, light, view)), VALUE_BOUND)
+        };
+        let [c0, c1, c2] = material.channels;
+        radiance(material, Values { c0: value(c0, t0), c1: value(c1, t1), c2: value(c2, t2) }, light)
+    }
+}
+
+/// Columns of one query's rows, blended into its lane (10.6-1).
+#[inline(always)]
+fn blend_lane(table: Table<'_>, taps: Taps, columns: &[i32], lanes: &mut [Lanes], lane: usize) {
+    let (a, b, c) = (table.row(taps.a), table.row(taps.b), table.row(taps.c));
+    for (&column, slots) in columns.iter().zip(lanes) {
+        let column = column as u32;
+        let sum = entry(a, column).wrapping_mul(taps.weight_a_q15).wrapping_add(entry(b, column).wrapping_mul(taps.weight_b_q15));
+        slots[lane & 7] = sum.wrapping_add(entry(c, column).wrapping_mul(taps.weight_c_q15)).wrapping_add(HALF_Q15) >> 15;
+    }
+}
+
+/// One column of the spatial rows of each query (10.6-2).
+#[inline(always)]
+fn blend_spans(table: Table<'_>, spans: &[Span; LANES], column: u32) -> Lanes {
+    let mut lanes = [0; LANES];
+    for (lane, span) in lanes.iter_mut().zip(spans) {
+        let a = entry(table.row(span.row_a), column).wrapping_mul(span.weight_a_q15);
+        let b = entry(table.row(span.row_b), column).wrapping_mul(span.weight_b_q15);
+        *lane = a.wrapping_add(b).wrapping_add(HALF_Q15) >> 15;
+    }
+    lanes
+}
+
+/// The sums of 10.7 for eight queries.
+#[inline(always)]
+fn sum_lanes(
+    coefficients: &[[i32; COEFFICIENT_WORDS]],
+    light_lanes: &[Lanes],
+    view_lanes: &[Lanes],
+    x_column: impl Fn(u32) -> Lanes,
+    y_column: impl Fn(u32) -> Lanes,
+) -> Lanes {
+    let mut total = [0i32; LANES];
+    let mut sum_y = [0i32; LANES];
+    let mut sum_xy = [0i32; LANES];
+    let mut spatial = 0u32;
+    let close = |into: &mut Lanes, from: &mut Lanes, u: Lanes| {
+        for ((into, from), u) in into.iter_mut().zip(from.iter_mut()).zip(u) {
+            *into = into.wrapping_add(multiply_q15(*from, u));
+            *from = 0;
+        }
+    };
+    for &[value, atom] in coefficients {
+        let atom = atom as u32;
+        let next = atom >> 24;
+        if next != spatial {
+            close(&mut sum_y, &mut sum_xy, x_column(spatial & 0xf));
+            if next >> 4 != spatial >> 4 {
+                close(&mut total, &mut sum_y, y_column(spatial >> 4));
+            }
+            spatial = next;
+        }
+        let (Some(light), Some(view)) = (light_lanes.get(((atom >> 14) & 0x3ff) as usize), view_lanes.get(((atom >> 4) & 0x3ff) as usize)) else {
+            continue;
+        };
+        // Rounding as in `round_shift`, for a shift that all lanes share.
+        let shift = atom & 0xf;
+        let (below, bit) = (shift.saturating_sub(1), (shift != 0) as i32);
+        for ((sum, light), view) in sum_xy.iter_mut().zip(light).zip(view) {
+            let product = value.wrapping_mul(light.wrapping_mul(*view).wrapping_add(HALF_Q15) >> 15);
+            *sum = sum.wrapping_add(product >> shift).wrapping_add((product >> below) & bit);
+        }
+    }
+    close(&mut sum_y, &mut sum_xy, x_column(spatial & 0xf));
+    close(&mut total, &mut sum_y, y_column(spatial >> 4));
+    total
+}

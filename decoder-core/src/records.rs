@@ -1,0 +1,91 @@
+//! Records unpacked for whole images and batches: each coefficient once, then used for many samples.
+
+use crate::ensemble::{Record, coefficients_start, dequantise, read_record};
+use crate::material::{Channel, Material};
+use crate::stream::{Ones, window};
+use crate::words::Words;
+
+/// One coefficient of a record, ready for products.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Coefficient {
+    /// The atom's word (10.5-2).
+    pub atom: u32,
+    /// Its number in the list of the dictionary.
+    pub position: u32,
+    /// The integer coefficient.
+    pub value: i32,
+}
+
+/// The record of a block in a layer.
+pub(crate) fn record_of(words: Words<'_>, material: &Material, channel: Channel, level: u32, layer: u32, block: u32) -> Record {
+    read_record(words, coefficients_start(words, material, channel, level, layer), block)
+}
+
+/// Bytes of the file from a word on. Records and atoms are never in an external dictionary.
+pub(crate) fn bytes_from<'a>(words: Words<'a>, start: u32) -> &'a [u8] {
+    words.file.get((start as usize).wrapping_mul(4)..).unwrap_or(&[])
+}
+
+/// The atoms of dictionary `dictionary`: pairs of words.
+pub(crate) fn atoms_of<'a>(words: Words<'a>, channel: Channel, dictionary: u32) -> &'a [[u8; 8]] {
+    let entry = channel.atoms_start.wrapping_add(2).wrapping_add(dictionary.wrapping_mul(2));
+    let count = crate::words::word(words, entry) as usize;
+    let start = channel.atoms_start.wrapping_add(crate::words::word(words, entry.wrapping_add(1)));
+    let list = bytes_from(words, start).as_chunks::<8>().0;
+    list.get(..count).unwrap_or(list)
+}
+
+/// Calls `each` for the coefficients of a record, in order.
+#[inline(always)]
+pub(crate) fn for_each_coefficient(words: Words<'_>, channel: Channel, record: &Record, mut each: impl FnMut(Coefficient)) {
+    let stream = bytes_from(words, record.stream);
+    let atoms = atoms_of(words, channel, record.dictionary);
+    let field_bits = record.low_bits.wrapping_add(record.value_bits);
+    let low_mask = (1u32 << record.low_bits).wrapping_sub(1);
+    let value_mask = (1u32 << record.value_bits).wrapping_sub(1);
+    let mut ones = Ones::new(stream, record.highs_bit, u32::MAX);
+    let mut field_bit = record.fields_bit;
+    for index in 0..record.count {
+        let Some(place) = ones.next() else { return };
+        let high = place.wrapping_sub(record.highs_bit).wrapping_sub(index);
+        let field = window(stream, field_bit) as u32;
+        field_bit = field_bit.wrapping_add(field_bits);
+        let position = (high << record.low_bits) | (field & low_mask);
+        let Some(&[a0, a1, a2, a3, q0, q1, q2, q3]) = atoms.get(position as usize) else { return };
+        let quantiser = u32::from_le_bytes([q0, q1, q2, q3]);
+        let value = dequantise(quantiser, (field >> record.low_bits) & value_mask, record.value_bits);
+        each(Coefficient { atom: u32::from_le_bytes([a0, a1, a2, a3]), position, value });
+    }
+}
+
+/// A factor's table: the bytes of its rows, and how long one is.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Table<'a> {
+    bytes: &'a [u8],
+    row_bytes: usize,
+}
+
+impl<'a> Table<'a> {
+    /// Table `which` (0 or 1) of dictionary `dictionary` of the factors at `start`, in either file.
+    pub fn new(words: Words<'a>, start: u32, dictionary: u32, which: u32) -> Table<'a> {
+        let entry = start.wrapping_add(2).wrapping_add(dictionary.wrapping_mul(4));
+        let columns = crate::words::word(words, entry.wrapping_add(which));
+        let table = start.wrapping_add(crate::words::word(words, entry.wrapping_add(2).wrapping_add(which)));
+        let file = if table < crate::words::DICTIONARY_START { words.file } else { words.dictionary };
+        let bytes = file.get(((table & 0x7fff_ffff) as usize).wrapping_mul(4)..).unwrap_or(&[]);
+        Table { bytes, row_bytes: (columns.wrapping_add(1) >> 1).wrapping_mul(4) as usize }
+    }
+
+    /// A row; its columns may run on into the next row, which no checked file asks for.
+    #[inline(always)]
+    pub fn row(&self, row: u32) -> &'a [[u8; 2]] {
+        let start = self.row_bytes.wrapping_mul(row as usize);
+        self.bytes.get(start..start.wrapping_add(self.row_bytes)).unwrap_or(&[]).as_chunks::<2>().0
+    }
+}
+
+/// Entry of a row; zero outside, which no checked file asks for.
+#[inline(always)]
+pub(crate) fn entry(row: &[[u8; 2]], column: u32) -> i32 {
+    row.get(column as usize).map_or(0, |&bytes| i16::from_le_bytes(bytes) as i32)
+}
