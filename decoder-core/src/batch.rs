@@ -5,16 +5,18 @@
 //! Plain arrays of eight numbers: a compiler makes vector instructions of them where there are any.
 
 use crate::colour::{Rgb, Values};
-use crate::direction::{Direction, Taps};
+use crate::direction::{
+    Direction, Taps, beyond_hull, clamp_direction, cross, dot_product, grid_cell, grid_start, hull_start, point, ratio_q15, triangles_start,
+};
 use crate::ensemble::Record;
-use crate::fixed::{HALF_Q15, clamp_magnitude, multiply_q15, round_shift};
-use crate::interpolation::{VALUE_BOUND, mean_q20, radiance, scale_q15, scale_texture};
+use crate::fixed::{HALF_Q15, ONE_Q15, clamp_magnitude, multiply_q15, round_shift};
+use crate::interpolation::{VALUE_BOUND, radiance, scale_texture};
 use crate::material::{CHANNEL_FULL, CHANNEL_MISSING, Channel};
 use crate::open::Selvedge;
 use crate::position::{Axis, Span, axis_at_position, block_count};
 use crate::records::{Table, entry, for_each_coefficient, record_of};
 use crate::result::BufferTooSmall;
-use crate::words::word;
+use crate::words::{Words, high_i16, low_i16, word};
 
 /// A filtered sample to be made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -37,8 +39,15 @@ type Lanes = [i32; LANES];
 const COLUMNS: usize = 1024;
 /// Words kept of a query: taps of light and view, textures of three channels.
 const QUERY_WORDS: usize = 10;
-/// Words kept of a query's part in a block: query, rows, weights along x and y.
-const ITEM_WORDS: usize = 4;
+/// Words kept of a query's part in a block: query, rows, weights along x and y, taps. What a block needs
+/// stands together, since queries are far apart in memory.
+const ITEM_WORDS: usize = 10;
+/// Textures kept of a query's part in a block.
+const PART_WORDS: usize = 3;
+/// Words of a triangle made ready: three lines, then its three words (5.3).
+const TRIANGLE_WORDS: usize = 12;
+/// Words of a hull edge made ready: two lines, squared length, its two words, the next direction.
+const EDGE_WORDS: usize = 10;
 /// Words kept of an unpacked coefficient: value, and its atom with columns numbered within the record.
 const COEFFICIENT_WORDS: usize = 2;
 
@@ -99,7 +108,7 @@ impl Selvedge<'_> {
     pub fn batch_scratch_len(&self, count: usize) -> usize {
         let material = self.material();
         let blocks = block_count(material, material.width) as usize * block_count(material, material.height) as usize;
-        count * (QUERY_WORDS + 4 * ITEM_WORDS) + blocks + 1 + 6 * COLUMNS + 2 * COLUMNS * LANES + self.largest_record() * COEFFICIENT_WORDS
+        count * (QUERY_WORDS + 4 * (ITEM_WORDS + PART_WORDS)) + blocks + 1 + self.ready_len(material.light_start) + self.ready_len(material.view_start) + 6 * COLUMNS + 2 * COLUMNS * LANES + self.largest_record() * COEFFICIENT_WORDS
     }
 
     /// Coefficients of the largest record of level 0.
@@ -123,11 +132,12 @@ impl Selvedge<'_> {
         let needed = self.batch_scratch_len(queries.len());
         let lent = scratch.len();
         let parts = self.split_scratch(queries.len(), scratch);
-        let Some((states, items, starts, mut workspace)) = parts else {
+        let Some((states, items, textures, starts, ready, mut workspace)) = parts else {
             return Err(BufferTooSmall { needed, lent });
         };
-        self.locate_all(queries, states);
-        let used = self.sort_by_block(queries, items, starts);
+        self.locate_all(queries, states, ready);
+        let used = self.sort_by_block(queries, states, items, starts);
+        textures.get_mut(..used).unwrap_or(&mut []).fill([0; PART_WORDS]);
         workspace.seen.fill(0);
         let mut mark = 0i32;
         for (number, &channel) in self.material().channels.iter().enumerate() {
@@ -138,6 +148,7 @@ impl Selvedge<'_> {
             for (block, &end) in (0u32..).zip(starts.iter()) {
                 let end = (end as usize).min(used);
                 let in_block = items.get(begin..end).unwrap_or(&[]);
+                let sums = textures.get_mut(begin..end).unwrap_or(&mut []);
                 begin = end;
                 for layer in 0..self.material().layer_limit {
                     if in_block.is_empty() {
@@ -146,9 +157,16 @@ impl Selvedge<'_> {
                     let record = record_of(self.words(), self.material(), channel, 0, layer, block);
                     if record.count > 0 {
                         mark = mark.wrapping_add(1);
-                        self.sample_record(channel, number, &record, mark, in_block, states, &mut workspace);
+                        self.sample_record(channel, number, &record, mark, in_block, sums, &mut workspace);
                     }
                 }
+            }
+        }
+        for (item, textures) in items.iter().zip(textures.iter()).take(used) {
+            if let Some([_, _, _, _, _, _, t0, t1, t2, _]) = states.get_mut(item[0] as usize) {
+                *t0 = t0.wrapping_add(textures[0]);
+                *t1 = t1.wrapping_add(textures[1]);
+                *t2 = t2.wrapping_add(textures[2]);
             }
         }
         for (state, rgb) in states.iter().zip(out) {
@@ -158,49 +176,77 @@ impl Selvedge<'_> {
     }
 
     /// Cuts the scratch into its parts; `None` if it is too short.
-    fn split_scratch<'s>(&self, count: usize, scratch: &'s mut [i32]) -> Option<(&'s mut [[i32; QUERY_WORDS]], &'s mut [[i32; ITEM_WORDS]], &'s mut [i32], Workspace<'s>)> {
+    #[allow(clippy::type_complexity, reason = "named once, taken apart at once")]
+    fn split_scratch<'s>(
+        &self,
+        count: usize,
+        scratch: &'s mut [i32],
+    ) -> Option<(&'s mut [[i32; QUERY_WORDS]], &'s mut [[i32; ITEM_WORDS]], &'s mut [[i32; PART_WORDS]], &'s mut [i32], &'s mut [i32], Workspace<'s>)> {
         let material = self.material();
         let blocks = block_count(material, material.width) as usize * block_count(material, material.height) as usize;
         let (states, rest) = scratch.split_at_mut_checked(count * QUERY_WORDS)?;
         let (items, rest) = rest.split_at_mut_checked(count * 4 * ITEM_WORDS)?;
+        let (textures, rest) = rest.split_at_mut_checked(count * 4 * PART_WORDS)?;
         let (starts, rest) = rest.split_at_mut_checked(blocks + 1)?;
+        let (ready, rest) = rest.split_at_mut_checked(self.ready_len(material.light_start) + self.ready_len(material.view_start))?;
         let (numbers, rest) = rest.split_at_mut_checked(2 * COLUMNS)?;
         let (seen, rest) = rest.split_at_mut_checked(2 * COLUMNS)?;
         let (columns, rest) = rest.split_at_mut_checked(2 * COLUMNS)?;
         let (blended, rest) = rest.split_at_mut_checked(2 * COLUMNS * LANES)?;
         let (coefficients, _) = rest.split_at_mut_checked(self.largest_record() * COEFFICIENT_WORDS)?;
         let workspace = Workspace { numbers, seen, columns, blended: blended.as_chunks_mut().0, coefficients: coefficients.as_chunks_mut().0 };
-        Some((states.as_chunks_mut().0, items.as_chunks_mut().0, starts, workspace))
+        Some((states.as_chunks_mut().0, items.as_chunks_mut().0, textures.as_chunks_mut().0, starts, ready, workspace))
     }
 
-    fn locate_all(&self, queries: &[FilteredQuery], states: &mut [[i32; QUERY_WORDS]]) {
+    /// Words of the ready set of directions at `start`.
+    fn ready_len(&self, start: u32) -> usize {
+        let count = |at: u32| word(self.words(), start.wrapping_add(at)) as usize;
+        count(1) * TRIANGLE_WORDS + count(2) * EDGE_WORDS
+    }
+
+    fn locate_all(&self, queries: &[FilteredQuery], states: &mut [[i32; QUERY_WORDS]], ready: &mut [i32]) {
+        let material = self.material();
+        let (light, view) = ready.split_at_mut(self.ready_len(material.light_start).min(ready.len()));
+        let light = ReadySet::new(self.words(), material.light_start, light);
+        let view = ReadySet::new(self.words(), material.view_start, view);
         for (query, state) in queries.iter().zip(states) {
-            let [l0, l1, l2] = pack_taps(self.locate_light(query.light));
-            let [v0, v1, v2] = pack_taps(self.locate_view(query.view));
+            let [l0, l1, l2] = pack_taps(light.locate(query.light));
+            let [v0, v1, v2] = pack_taps(view.locate(query.view));
             *state = [l0, l1, l2, v0, v1, v2, 0, 0, 0, 0];
         }
     }
 
     /// A counting sort of the queries' parts by block: afterwards `starts[b]` is the end of block `b`. Gives the parts.
-    fn sort_by_block(&self, queries: &[FilteredQuery], items: &mut [[i32; ITEM_WORDS]], starts: &mut [i32]) -> usize {
+    fn sort_by_block(&self, queries: &[FilteredQuery], states: &[[i32; QUERY_WORDS]], items: &mut [[i32; ITEM_WORDS]], starts: &mut [i32]) -> usize {
         let material = self.material();
         let blocks_x = block_count(material, material.width);
         let axes = |query: &FilteredQuery| {
             let axis = |size: u32, position: u32| axis_at_position(material.edge, material.edge_reciprocal_q18, size, position);
             (axis(material.width, query.u_q32), axis(material.height, query.v_q32))
         };
-        let spans = |axis: Axis| [Some(axis.first), (axis.count == 2).then_some(axis.second)].into_iter().flatten();
+        // One, two or four parts; the common case first and alone.
+        let visit = |x: Axis, y: Axis, visit: &mut dyn FnMut(Span, Span)| {
+            if x.count == 2 {
+                visit(x.second, y.first);
+            }
+            if y.count == 2 {
+                visit(x.first, y.second);
+                if x.count == 2 {
+                    visit(x.second, y.second);
+                }
+            }
+        };
         let block_at = |x: Span, y: Span| y.block.wrapping_mul(blocks_x).wrapping_add(x.block) as usize;
         starts.fill(0);
         for query in queries {
             let (x_axis, y_axis) = axes(query);
-            for y in spans(y_axis) {
-                for x in spans(x_axis) {
-                    if let Some(count) = starts.get_mut(block_at(x, y)) {
-                        *count = count.wrapping_add(1);
-                    }
+            let mut count = |x: Span, y: Span| {
+                if let Some(count) = starts.get_mut(block_at(x, y)) {
+                    *count = count.wrapping_add(1);
                 }
-            }
+            };
+            count(x_axis.first, y_axis.first);
+            visit(x_axis, y_axis, &mut count);
         }
         let mut total = 0i32;
         for start in starts.iter_mut() {
@@ -208,19 +254,20 @@ impl Selvedge<'_> {
             *start = total;
             total = total.wrapping_add(count);
         }
-        for (number, query) in (0i32..).zip(queries) {
+        for (number, (query, state)) in (0i32..).zip(queries.iter().zip(states)) {
             let (x_axis, y_axis) = axes(query);
-            for y in spans(y_axis) {
-                for x in spans(x_axis) {
-                    let Some(place) = starts.get_mut(block_at(x, y)) else { continue };
-                    let rows = x.row_a | x.row_b << 8 | y.row_a << 16 | y.row_b << 24;
-                    let weights = |span: Span| span.weight_a_q15 | span.weight_b_q15 << 16;
-                    if let Some(item) = items.get_mut(*place as usize) {
-                        *item = [number, rows as i32, weights(x), weights(y)];
-                    }
-                    *place = place.wrapping_add(1);
+            let [l0, l1, l2, v0, v1, v2, ..] = *state;
+            let mut place = |x: Span, y: Span| {
+                let Some(place) = starts.get_mut(block_at(x, y)) else { return };
+                let rows = x.row_a | x.row_b << 8 | y.row_a << 16 | y.row_b << 24;
+                let weights = |span: Span| span.weight_a_q15 | span.weight_b_q15 << 16;
+                if let Some(item) = items.get_mut(*place as usize) {
+                    *item = [number, rows as i32, weights(x), weights(y), l0, l1, l2, v0, v1, v2];
                 }
-            }
+                *place = place.wrapping_add(1);
+            };
+            place(x_axis.first, y_axis.first);
+            visit(x_axis, y_axis, &mut place);
         }
         total as usize
     }
@@ -242,7 +289,7 @@ impl Selvedge<'_> {
 
     /// Adds what a record gives to the textures of the queries that meet its block.
     #[inline(always)]
-    fn sample_record(&self, channel: Channel, number: usize, record: &Record, mark: i32, items: &[[i32; ITEM_WORDS]], states: &mut [[i32; QUERY_WORDS]], workspace: &mut Workspace<'_>) {
+    fn sample_record(&self, channel: Channel, number: usize, record: &Record, mark: i32, items: &[[i32; ITEM_WORDS]], textures: &mut [[i32; PART_WORDS]], workspace: &mut Workspace<'_>) {
         let words = self.words();
         let unpacked = self.unpack(channel, record, mark, workspace);
         let tables = [0, 1].map(|which| Table::new(words, channel.angular_start, record.dictionary, which));
@@ -252,12 +299,11 @@ impl Selvedge<'_> {
         let light_columns = light_columns.get(..unpacked.lights).unwrap_or(&[]);
         let view_columns = view_columns.get(..unpacked.views).unwrap_or(&[]);
         let coefficients = workspace.coefficients.get(..unpacked.count).unwrap_or(&[]);
-        for group in items.chunks(LANES) {
+        for (group, textures) in items.chunks(LANES).zip(textures.chunks_mut(LANES)) {
             let mut x_spans = [Span::default(); LANES];
             let mut y_spans = [Span::default(); LANES];
             for (lane, item) in group.iter().enumerate() {
-                let state = states.get(item[0] as usize).copied().unwrap_or_default();
-                let [l0, l1, l2, v0, v1, v2, ..] = state;
+                let [_, _, _, _, l0, l1, l2, v0, v1, v2] = *item;
                 blend_lane(tables[0], unpack_taps([l0, l1, l2]), light_columns, light_lanes, lane);
                 blend_lane(tables[1], unpack_taps([v0, v1, v2]), view_columns, view_lanes, lane);
                 let rows = item[1] as u32;
@@ -272,12 +318,25 @@ impl Selvedge<'_> {
                 y_spans[lane & 7] = span(rows >> 16, item[3]);
             }
             let total = sum_lanes(coefficients, light_lanes, view_lanes, |x| blend_spans(spatial[0], &x_spans, x), |y| blend_spans(spatial[1], &y_spans, y));
-            for (item, total) in group.iter().zip(total) {
-                if let Some(sum) = states.get_mut(item[0] as usize).and_then(|state| state.get_mut(number.wrapping_add(6))) {
+            for (textures, total) in textures.iter_mut().zip(total) {
+                if let Some(sum) = textures.get_mut(number) {
                     *sum = sum.wrapping_add(round_shift(total, record.shift));
                 }
             }
         }
+    }
+
+    /// [`crate::interpolation::blend_table_q15`] by rows.
+    #[inline(always)]
+    fn blend_pairs(&self, start: u32, light: Taps, view: Taps) -> i32 {
+        let table = Table::of_pairs(self.words(), start, self.material().light_count);
+        let row = |view: u32, weight: i32| {
+            let row = table.row(view);
+            let at = |light: u32, weight: i32| entry(row, light).wrapping_mul(weight);
+            let sum = at(light.a, light.weight_a_q15).wrapping_add(at(light.b, light.weight_b_q15));
+            multiply_q15(sum.wrapping_add(at(light.c, light.weight_c_q15)), weight)
+        };
+        row(view.a, view.weight_a_q15).wrapping_add(row(view.b, view.weight_b_q15)).wrapping_add(row(view.c, view.weight_c_q15))
     }
 
     /// Means, scales and colour of a query whose textures are summed.
@@ -291,13 +350,130 @@ impl Selvedge<'_> {
             }
             let mut texture = texture;
             if channel.scale_start != 0 {
-                let scale = scale_q15(words, material, channel, light, view);
+                let scale = round_shift(self.blend_pairs(channel.scale_start, light, view), 15);
                 texture = scale_texture(texture, scale, word(words, channel.scale_start.wrapping_add(1)));
             }
-            clamp_magnitude(texture.wrapping_add(mean_q20(words, material, channel, light, view)), VALUE_BOUND)
+            let base_q20 = word(words, channel.mean_start) as i32;
+            let shift = 15u32.wrapping_sub(word(words, channel.mean_start.wrapping_add(1)));
+            let mean = round_shift(self.blend_pairs(channel.mean_start, light, view), shift).wrapping_add(base_q20);
+            clamp_magnitude(texture.wrapping_add(mean), VALUE_BOUND)
         };
         let [c0, c1, c2] = material.channels;
         radiance(material, Values { c0: value(c0, t0), c1: value(c1, t1), c2: value(c2, t2) }, light)
+    }
+}
+
+/// A set of directions with the lines of its triangles made ready: the signed areas of 5.4-1 are linear
+/// in the point, so each is two products and a sum, exact modulo 2^32.
+struct ReadySet<'a, 's> {
+    words: Words<'a>,
+    start: u32,
+    grid: u32,
+    grid_size: u32,
+    triangles: &'s [[i32; TRIANGLE_WORDS]],
+    edges: &'s [[i32; EDGE_WORDS]],
+}
+
+/// `value = x * p.x + y * p.y + c`.
+fn line(value: impl Fn(i32, i32) -> i32) -> [i32; 3] {
+    let c = value(0, 0);
+    [value(1, 0).wrapping_sub(c), value(0, 1).wrapping_sub(c), c]
+}
+
+/// The value of a line at a point.
+#[inline(always)]
+fn at_point(x: i32, y: i32, c: i32, direction: &Direction) -> i32 {
+    x.wrapping_mul(direction.x_q14).wrapping_add(y.wrapping_mul(direction.y_q14)).wrapping_add(c)
+}
+
+impl<'a, 's> ReadySet<'a, 's> {
+    fn new(words: Words<'a>, start: u32, scratch: &'s mut [i32]) -> Self {
+        let triangle_count = word(words, start.wrapping_add(1)) as usize;
+        let (triangles, edges) = scratch.split_at_mut((triangle_count * TRIANGLE_WORDS).min(scratch.len()));
+        let (triangles, edges) = (triangles.as_chunks_mut().0, edges.as_chunks_mut().0);
+        let at = |index: u32| {
+            let pair = point(words, start, index);
+            (low_i16(pair), high_i16(pair))
+        };
+        for (number, ready) in (0u32..).zip(triangles.iter_mut()) {
+            let triangle = triangles_start(words, start).wrapping_add(number.wrapping_mul(3));
+            let [first, second, third] = [0, 1, 2].map(|n| word(words, triangle.wrapping_add(n)));
+            let (a, b, c) = (at(first & 0xffff), at(first >> 16), at(second & 0xffff));
+            let side = |p: (i32, i32), q: (i32, i32)| line(|x, y| cross(p.0, p.1, q.0, q.1, x, y));
+            let ([a0, a1, a2], [b0, b1, b2], [c0, c1, c2]) = (side(b, c), side(c, a), side(a, b));
+            *ready = [a0, a1, a2, b0, b1, b2, c0, c1, c2, first as i32, second as i32, third as i32];
+        }
+        let count = word(words, start.wrapping_add(2));
+        let hull = hull_start(words, start);
+        for (number, ready) in (0u32..).zip(edges.iter_mut()) {
+            let next = if number.wrapping_add(1) < count { number.wrapping_add(1) } else { 0 };
+            let [first, reciprocal] = [0, 1].map(|n| word(words, hull.wrapping_add(number.wrapping_mul(2)).wrapping_add(n)));
+            let other = word(words, hull.wrapping_add(next.wrapping_mul(2))) & 0xffff;
+            let (a, b) = (at(first & 0xffff), at(other));
+            let [x, y, c] = line(|x, y| dot_product(a.0, a.1, b.0, b.1, x, y));
+            let [ox, oy, oc] = line(|x, y| cross(b.0, b.1, a.0, a.1, x, y));
+            let length = dot_product(a.0, a.1, b.0, b.1, b.0, b.1);
+            *ready = [x, y, c, ox, oy, oc, length, first as i32, reciprocal as i32, other as i32];
+        }
+        ReadySet { words, start, grid: grid_start(words, start), grid_size: word(words, start.wrapping_add(3)), triangles, edges }
+    }
+
+    /// [`crate::direction::locate`], the same bits.
+    #[inline(always)]
+    fn locate(&self, asked: Direction) -> Taps {
+        let direction = clamp_direction(asked);
+        let size = self.grid_size;
+        let cell = grid_cell(direction.y_q14, size).wrapping_mul(size).wrapping_add(grid_cell(direction.x_q14, size));
+        let candidates = self.grid.wrapping_add(size.wrapping_mul(size)).wrapping_add(1);
+        let first = word(self.words, self.grid.wrapping_add(cell));
+        let last = word(self.words, self.grid.wrapping_add(cell).wrapping_add(1));
+        for candidate in first..last {
+            let number = word(self.words, candidates.wrapping_add(candidate));
+            let Some(&[a0, a1, a2, b0, b1, b2, c0, c1, c2, first, second, reciprocal]) = self.triangles.get(number as usize) else { break };
+            let area_a = at_point(a0, a1, a2, &direction);
+            let area_b = at_point(b0, b1, b2, &direction);
+            if (area_a | area_b | at_point(c0, c1, c2, &direction)) >= 0 {
+                let shift = second as u32 >> 16;
+                let weight_a = ratio_q15(area_a, shift, reciprocal as u32, ONE_Q15);
+                let weight_b = ratio_q15(area_b, shift, reciprocal as u32, ONE_Q15.wrapping_sub(weight_a));
+                return Taps {
+                    a: first as u32 & 0xffff,
+                    b: first as u32 >> 16,
+                    c: second as u32 & 0xffff,
+                    weight_a_q15: weight_a,
+                    weight_b_q15: weight_b,
+                    weight_c_q15: ONE_Q15.wrapping_sub(weight_a).wrapping_sub(weight_b),
+                    cosine_q15: ONE_Q15,
+                };
+            }
+        }
+        self.locate_on_hull(direction)
+    }
+
+    /// [`crate::direction::locate_on_hull`], the same bits.
+    fn locate_on_hull(&self, direction: Direction) -> Taps {
+        let on_edge = |edge: &[i32; EDGE_WORDS]| {
+            let along = at_point(edge[0], edge[1], edge[2], &direction);
+            (along, edge[6].wrapping_sub(along), at_point(edge[3], edge[4], edge[5], &direction))
+        };
+        let Some(last) = self.edges.last() else {
+            return beyond_hull(self.words, self.start, direction, 0, 0, 0);
+        };
+        let mut past_previous = on_edge(last).1 < 0;
+        let mut corner = 0;
+        for edge in self.edges {
+            let (along, left, outside) = on_edge(edge);
+            let a = edge[7] as u32 & 0xffff;
+            if (along | left | outside) >= 0 {
+                let weight_b = ratio_q15(along, edge[7] as u32 >> 16, edge[8] as u32, ONE_Q15);
+                return beyond_hull(self.words, self.start, direction, a, edge[9] as u32, weight_b);
+            }
+            if past_previous & (along < 0) {
+                corner = a;
+            }
+            past_previous = left < 0;
+        }
+        beyond_hull(self.words, self.start, direction, corner, corner, 0)
     }
 }
 

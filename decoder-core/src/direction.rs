@@ -5,7 +5,7 @@
 //! integer orientation tests; beyond the hull the point moves to the nearest place on it.
 
 use crate::fixed::{HALF_Q15, ONE_Q15, divide_q15, round_shift};
-use crate::words::{Words, word};
+use crate::words::{Words, high_i16, low_i16, word};
 
 /// One in Q14: the radius of the disc.
 pub const ONE_Q14: i32 = 16384;
@@ -116,14 +116,9 @@ pub fn grid_start(words: Words<'_>, start: u32) -> u32 {
     hull_start(words, start).wrapping_add(word(words, start.wrapping_add(2)).wrapping_mul(2))
 }
 
-/// x of sample direction `index`, Q14 (5.3-3).
-pub fn point_x_q14(words: Words<'_>, start: u32, index: u32) -> i32 {
-    ((word(words, points_start(start).wrapping_add(index.wrapping_mul(2))) << 16) as i32) >> 16
-}
-
-/// y of sample direction `index`, Q14 (5.3-3).
-pub fn point_y_q14(words: Words<'_>, start: u32, index: u32) -> i32 {
-    (word(words, points_start(start).wrapping_add(index.wrapping_mul(2))) as i32) >> 16
+/// The point of sample direction `index`: x in the low half, y in the high, Q14 (5.3-3).
+pub fn point(words: Words<'_>, start: u32, index: u32) -> u32 {
+    word(words, points_start(start).wrapping_add(index.wrapping_mul(2)))
 }
 
 /// Cosine of sample direction `index`, Q15 (5.3-4).
@@ -175,16 +170,20 @@ pub fn locate(words: Words<'_>, start: u32, asked: Direction) -> Taps {
         let a = first & 0xffff;
         let b = first >> 16;
         let c = second & 0xffff;
-        let ax = point_x_q14(words, start, a);
-        let ay = point_y_q14(words, start, a);
-        let bx = point_x_q14(words, start, b);
-        let by = point_y_q14(words, start, b);
-        let cx = point_x_q14(words, start, c);
-        let cy = point_y_q14(words, start, c);
+        let point_a = point(words, start, a);
+        let point_b = point(words, start, b);
+        let point_c = point(words, start, c);
+        let ax = low_i16(point_a);
+        let ay = high_i16(point_a);
+        let bx = low_i16(point_b);
+        let by = high_i16(point_b);
+        let cx = low_i16(point_c);
+        let cy = high_i16(point_c);
         let area_a = cross(bx, by, cx, cy, px, py);
         let area_b = cross(cx, cy, ax, ay, px, py);
         let area_c = cross(ax, ay, bx, by, px, py);
-        if area_a >= 0 && area_b >= 0 && area_c >= 0 {
+        // One test for three signs: the sign bit of the union is set if any is negative.
+        if (area_a | area_b | area_c) >= 0 {
             // 5.6-2: two weights by reciprocal, the last is what is left.
             let shift = second >> 16;
             let reciprocal = word(words, triangle.wrapping_add(2));
@@ -209,37 +208,39 @@ pub fn locate_on_hull(words: Words<'_>, start: u32, direction: Direction) -> Tap
         return beyond_hull(words, start, direction, 0, 0, 0);
     }
     // 5.7-1: the last edge is looked at first, so that the first knows what precedes it.
-    let last = word(words, hull.wrapping_add(hull_count.wrapping_sub(1).wrapping_mul(2))) & 0xffff;
+    let last = point(words, start, word(words, hull.wrapping_add(hull_count.wrapping_sub(1).wrapping_mul(2))) & 0xffff);
     let mut first = word(words, hull);
     let mut a = first & 0xffff;
-    let mut ax = point_x_q14(words, start, a);
-    let mut ay = point_y_q14(words, start, a);
-    let mut past_previous = edge_position(point_x_q14(words, start, last), point_y_q14(words, start, last), ax, ay, px, py) == 2;
+    let mut point_a = point(words, start, a);
+    let mut past_previous = dot_product(low_i16(point_a), high_i16(point_a), low_i16(last), high_i16(last), px, py) < 0;
     let mut corner = a;
     let mut edge = 0u32;
     while edge < hull_count {
         let next = if edge.wrapping_add(1) < hull_count { edge.wrapping_add(1) } else { 0 };
         let second = word(words, hull.wrapping_add(next.wrapping_mul(2)));
         let b = second & 0xffff;
-        let bx = point_x_q14(words, start, b);
-        let by = point_y_q14(words, start, b);
-        let position = edge_position(ax, ay, bx, by, px, py);
+        let point_b = point(words, start, b);
+        let ax = low_i16(point_a);
+        let ay = high_i16(point_a);
+        let bx = low_i16(point_b);
+        let by = high_i16(point_b);
+        let along = dot_product(ax, ay, bx, by, px, py);
+        let left = dot_product(bx, by, ax, ay, px, py);
+        let outside = cross(bx, by, ax, ay, px, py);
         // 5.7-2: the foot of the perpendicular lies on this edge and the point is not inside of it.
-        if position == 1 && cross(ax, ay, bx, by, px, py) <= 0 {
-            let along = dot_product(ax, ay, bx, by, px, py);
+        if (along | left | outside) >= 0 {
             let reciprocal = word(words, hull.wrapping_add(edge.wrapping_mul(2)).wrapping_add(1));
             let weight_b = ratio_q15(along, first >> 16, reciprocal, ONE_Q15);
             return beyond_hull(words, start, direction, a, b, weight_b);
         }
         // 5.7-3: between two edges: past the end of the one, before the begin of the other.
-        if past_previous && position == 0 {
+        if past_previous && along < 0 {
             corner = a;
         }
-        past_previous = position == 2;
+        past_previous = left < 0;
         first = second;
         a = b;
-        ax = bx;
-        ay = by;
+        point_a = point_b;
         edge = edge.wrapping_add(1);
     }
     beyond_hull(words, start, direction, corner, corner, 0)
@@ -253,20 +254,6 @@ pub fn dot_product(ax: i32, ay: i32, bx: i32, by: i32, px: i32, py: i32) -> i32 
     let first = bx.wrapping_sub(ax).wrapping_mul(px.wrapping_sub(ax));
     let second = by.wrapping_sub(ay).wrapping_mul(py.wrapping_sub(ay));
     first.wrapping_add(second)
-}
-
-/// 0 if the foot of the perpendicular from `p` lies before the edge `a` to `b`, 1 on it, 2 past it (5.7-1).
-///
-/// Both ends count as on it.
-pub fn edge_position(ax: i32, ay: i32, bx: i32, by: i32, px: i32, py: i32) -> u32 {
-    // 5.7-1: measured from both ends, so that no squared length is needed.
-    if dot_product(ax, ay, bx, by, px, py) < 0 {
-        return 0;
-    }
-    if dot_product(bx, by, ax, ay, px, py) < 0 {
-        return 2;
-    }
-    1
 }
 
 /// Two directions of the hull, and the cosine beyond it (5.7-5).

@@ -6,9 +6,9 @@
 //! sides. The grid lists every triangle that meets a cell, so the first hit is always found.
 
 use crate::check::{Check, Section};
-use crate::direction::{cross, dot_product, grid_cell, grid_start, hull_start, point_x_q14, point_y_q14, triangles_start};
+use crate::direction::{cross, dot_product, grid_cell, grid_start, hull_start, point, triangles_start};
 use crate::error::Rule;
-use crate::words::word;
+use crate::words::{high_i16, low_i16, word};
 
 /// A point in Q14.
 type Point = (i32, i32);
@@ -68,7 +68,8 @@ pub fn meets_cell(triangle: [Point; 3], x: (i32, i32), y: (i32, i32)) -> bool {
 
 impl Set {
     fn point(&self, check: &Check<'_, '_>, index: u32) -> Point {
-        (point_x_q14(check.words, self.start, index), point_y_q14(check.words, self.start, index))
+        let pair = point(check.words, self.start, index);
+        (low_i16(pair), high_i16(pair))
     }
 
     fn corners(&self, check: &Check<'_, '_>, triangle: u32) -> [u32; 3] {

@@ -220,39 +220,76 @@ fn check_record(check: &mut Check<'_, '_>, stream: &Stream<'_>, bit: u32, stream
     let list = list.as_chunks::<8>().0;
     let list = list.get(..atom_count as usize).unwrap_or(&[]);
 
-    let (low_mask, value_mask) = (mask(low_bits) as u32, mask(stream.value_bits) as u32);
-    let half = (1u32 << stream.value_bits) >> 1;
-    let mut field_bit = fields as u32;
-    let mut ones = Ones::new(stream.bytes, highs as u32, stream.bits);
-    let mut sum = 0u32;
-    let mut ascends = true;
+    let layout = Layout { value_bits: stream.value_bits, low_bits, count, fields: fields as u32, highs: highs as u32, end: stream.bits };
+    let scan = scan_record(stream.bytes, list, layout);
+    if let Some(position) = scan.beyond {
+        check.find(Rule::RecordPositions, at, position);
+        return None;
+    }
+    if !check.ensure(scan.count == count, Rule::RecordPlace, at, bit) || !check.ensure(scan.ascends, Rule::RecordPositions, at, bit) {
+        return None;
+    }
+    let (sum, end) = (scan.sum, scan.end);
+    check.ensure(sum <= SUM_LIMIT, Rule::RecordSum, at, sum);
+    if check.stopped { None } else { Some((end, count)) }
+}
+
+/// Where the parts of a record are.
+#[derive(Clone, Copy)]
+struct Layout {
+    value_bits: u32,
+    low_bits: u32,
+    count: u32,
+    fields: u32,
+    highs: u32,
+    end: u32,
+}
+
+/// What a record was found to hold.
+struct Scan {
+    /// Coefficients before the stream ended.
+    count: u32,
+    /// The bit after the last.
+    end: u32,
+    /// Sum of the shifted magnitudes.
+    sum: u32,
+    /// Positions ascend.
+    ascends: bool,
+    /// A position that no atom has.
+    beyond: Option<u32>,
+}
+
+/// The hot loop of `open`: apart from everything else, so that it runs in registers.
+#[inline(never)]
+fn scan_record(bytes: &[u8], list: &[[u8; 8]], layout: Layout) -> Scan {
+    let Layout { value_bits, low_bits, count, fields, highs, end } = layout;
+    let low_mask = (1u32 << low_bits) - 1;
+    let value_mask = (1u32 << value_bits) - 1;
+    let half = (1u32 << value_bits) >> 1;
+    let mut field_bit = fields;
+    let mut ones = Ones::new(bytes, highs, end);
+    let mut scan = Scan { count: 0, end: highs, sum: 0, ascends: true, beyond: None };
     let mut next = 0u32;
-    let mut index = 0u32;
-    let mut end = highs as u32;
-    while index < count {
+    while scan.count < count {
         let Some(place) = ones.next() else { break };
-        end = place + 1;
-        let high = place - highs as u32 - index;
-        let field = window(stream.bytes, field_bit) as u32;
-        field_bit += field_bits;
+        scan.end = place + 1;
+        let high = place - highs - scan.count;
+        let field = window(bytes, field_bit) as u32;
+        field_bit += low_bits + value_bits;
         // A high part beyond all atoms must not wrap back to one.
         let position = if high < ATOM_LIMIT { high << low_bits | field & low_mask } else { u32::MAX };
         let Some(&[a, _, _, _, b0, b1, s0, s1]) = list.get(position as usize) else {
-            check.find(Rule::RecordPositions, at, position);
-            return None;
+            scan.beyond = Some(position);
+            break;
         };
-        ascends &= position >= next;
+        scan.ascends &= position >= next;
         next = position + 1;
         let step = u16::from_le_bytes([s0, s1]) as u32;
         let value = (field >> low_bits) & value_mask;
-        let coefficient = i16::from_le_bytes([b0, b1]) as i32 + ((value * step + half) >> stream.value_bits) as i32;
+        let coefficient = i16::from_le_bytes([b0, b1]) as i32 + ((value * step + half) >> value_bits) as i32;
         let atom_shift = a & 0xf;
-        sum += (coefficient.unsigned_abs() + (1 << atom_shift) - 1) >> atom_shift;
-        index += 1;
+        scan.sum += (coefficient.unsigned_abs() + (1 << atom_shift) - 1) >> atom_shift;
+        scan.count += 1;
     }
-    if !check.ensure(index == count, Rule::RecordPlace, at, bit) || !check.ensure(ascends, Rule::RecordPositions, at, bit) {
-        return None;
-    }
-    check.ensure(sum <= SUM_LIMIT, Rule::RecordSum, at, sum);
-    if check.stopped { None } else { Some((end, count)) }
+    scan
 }

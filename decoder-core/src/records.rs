@@ -76,6 +76,11 @@ impl<'a> Table<'a> {
         Table { bytes, row_bytes: (columns.wrapping_add(1) >> 1).wrapping_mul(4) as usize }
     }
 
+    /// The rows of a table of means or scales at `start`: one for each view, an entry for each light.
+    pub fn of_pairs(words: Words<'a>, start: u32, light_count: u32) -> Table<'a> {
+        Table { bytes: bytes_from(words, start.wrapping_add(4)), row_bytes: (light_count.wrapping_add(1) >> 1).wrapping_mul(4) as usize }
+    }
+
     /// A row; its columns may run on into the next row, which no checked file asks for.
     #[inline(always)]
     pub fn row(&self, row: u32) -> &'a [[u8; 2]] {

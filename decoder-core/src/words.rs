@@ -35,6 +35,20 @@ pub fn packed_i16(words: Words<'_>, start: u32, index: u32) -> i32 {
     ((pair << (16 - ((index & 1) << 4))) as i32) >> 16
 }
 
+/// The low half of a word with its sign (1.2-2).
+#[inline(always)]
+pub fn low_i16(pair: u32) -> i32 {
+    // 1.2-2: up, then back with its sign.
+    ((pair << 16) as i32) >> 16
+}
+
+/// The high half of a word with its sign (1.2-2).
+#[inline(always)]
+pub fn high_i16(pair: u32) -> i32 {
+    // 1.2-2: the shift keeps the sign.
+    (pair as i32) >> 16
+}
+
 /// 32 bits that begin at bit `bit` of the stream at word `start`, lowest bit first (1.2-3).
 #[inline(always)]
 pub fn bit_window(words: Words<'_>, start: u32, bit: u32) -> u32 {

@@ -73,10 +73,14 @@ fn main() {
             black_box(plain(query));
         }
     }));
-    println!("filtered, 2 x 64 coefficients, batch of {}  {}", queries.len(), rate(count, || {
-        material.sample_batch(&queries, &mut scratch, &mut out).expect("buffers fit");
-        black_box(&out);
-    }));
+    for batch in [1 << 12, 1 << 14, 1 << 15, 1 << 16] {
+        println!("filtered, 2 x 64 coefficients, batches of {batch:5} {}", rate(count, || {
+            for (queries, out) in queries.chunks(batch).zip(out.chunks_mut(batch)) {
+                material.sample_batch(queries, &mut scratch, out).expect("buffers fit");
+            }
+            black_box(&out);
+        }));
+    }
     println!("two directions located                         {}", rate(count, || {
         for query in &queries {
             black_box((material.locate_light(query.light), material.locate_view(query.view)));

@@ -53,7 +53,7 @@ pub fn answer_on_cpu(material: &Selvedge<'_>, entry: &str, query: &Query) -> Ans
     let (words, m) = (material.words(), material.material());
     let [lx, ly, lz] = query.light;
     let [vx, vy, vz] = query.view;
-    if entry == "point" {
+    if entry == "texel" {
         let values = material.point_values(query.u, query.v, lx, vx);
         return Answer::new(radiance(m, values, single_tap(lx)), values);
     }
@@ -188,7 +188,7 @@ impl Gpu {
         Ok(bytemuck::cast_slice(&mapped).to_vec())
     }
 
-    /// Answers of `point`, `filtered`, `trilinear` or `floats`, one for each query.
+    /// Answers of `texel`, `filtered`, `trilinear` or `floats`, one for each query.
     pub fn answer(&self, loaded: &Loaded, entry: &str, queries: &[Query]) -> Result<Vec<Answer>> {
         let mut answers = Vec::with_capacity(queries.len());
         // A dispatch of at most 2^16 - 1 groups of 64; smaller ones keep watchdogs of real devices quiet.

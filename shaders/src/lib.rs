@@ -76,7 +76,7 @@ pub const QUERY_WORDS: usize = 10;
 /// Words of an answer.
 pub const ANSWER_WORDS: usize = 6;
 /// Names of the entry points: four for lists of queries in groups of 64, then `image` in groups of 8 x 8.
-pub const ENTRY_POINTS: [&str; 5] = ["point", "filtered", "trilinear", "floats", "image"];
+pub const ENTRY_POINTS: [&str; 5] = ["texel", "filtered", "trilinear", "floats", "image"];
 
 /// The modules of a shader, in order.
 pub fn modules(request: &Request<'_>) -> Vec<Module> {

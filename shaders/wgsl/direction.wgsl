@@ -102,14 +102,9 @@ fn grid_start(start: u32) -> u32 {
     return hull_start(start) + word(start + 2u) * 2u;
 }
 
-// x of sample direction `index`, Q14 (5.3-3).
-fn point_x_q14(start: u32, index: u32) -> i32 {
-    return i32(word(points_start(start) + index * 2u) << 16u) >> 16u;
-}
-
-// y of sample direction `index`, Q14 (5.3-3).
-fn point_y_q14(start: u32, index: u32) -> i32 {
-    return i32(word(points_start(start) + index * 2u)) >> 16u;
+// The point of sample direction `index`: x in the low half, y in the high, Q14 (5.3-3).
+fn point(start: u32, index: u32) -> u32 {
+    return word(points_start(start) + index * 2u);
 }
 
 // Cosine of sample direction `index`, Q15 (5.3-4).
@@ -159,16 +154,20 @@ fn locate(start: u32, asked: Direction) -> Taps {
         let a = first & 0xffffu;
         let b = first >> 16u;
         let c = second & 0xffffu;
-        let ax = point_x_q14(start, a);
-        let ay = point_y_q14(start, a);
-        let bx = point_x_q14(start, b);
-        let by = point_y_q14(start, b);
-        let cx = point_x_q14(start, c);
-        let cy = point_y_q14(start, c);
+        let point_a = point(start, a);
+        let point_b = point(start, b);
+        let point_c = point(start, c);
+        let ax = low_i16(point_a);
+        let ay = high_i16(point_a);
+        let bx = low_i16(point_b);
+        let by = high_i16(point_b);
+        let cx = low_i16(point_c);
+        let cy = high_i16(point_c);
         let area_a = cross(bx, by, cx, cy, px, py);
         let area_b = cross(cx, cy, ax, ay, px, py);
         let area_c = cross(ax, ay, bx, by, px, py);
-        if (area_a >= 0 && area_b >= 0 && area_c >= 0) {
+        // One test for three signs: the sign bit of the union is set if any is negative.
+        if ((area_a | area_b | area_c) >= 0) {
             // 5.6-2: two weights by reciprocal, the last is what is left.
             let shift = second >> 16u;
             let reciprocal = word(triangle + 2u);
@@ -193,12 +192,11 @@ fn locate_on_hull(start: u32, direction: Direction) -> Taps {
         return beyond_hull(start, direction, 0u, 0u, 0);
     }
     // 5.7-1: the last edge is looked at first, so that the first knows what precedes it.
-    let last = word(hull + (hull_count - 1u) * 2u) & 0xffffu;
+    let last = point(start, word(hull + (hull_count - 1u) * 2u) & 0xffffu);
     var first = word(hull);
     var a = first & 0xffffu;
-    var ax = point_x_q14(start, a);
-    var ay = point_y_q14(start, a);
-    var past_previous = edge_position(point_x_q14(start, last), point_y_q14(start, last), ax, ay, px, py) == 2u;
+    var point_a = point(start, a);
+    var past_previous = dot_product(low_i16(point_a), high_i16(point_a), low_i16(last), high_i16(last), px, py) < 0;
     var corner = a;
     var edge = 0u;
     while (edge < hull_count) {
@@ -206,25 +204,28 @@ fn locate_on_hull(start: u32, direction: Direction) -> Taps {
         let next = select(0u, edge + 1u, edge + 1u < hull_count);
         let second = word(hull + next * 2u);
         let b = second & 0xffffu;
-        let bx = point_x_q14(start, b);
-        let by = point_y_q14(start, b);
-        let position = edge_position(ax, ay, bx, by, px, py);
+        let point_b = point(start, b);
+        let ax = low_i16(point_a);
+        let ay = high_i16(point_a);
+        let bx = low_i16(point_b);
+        let by = high_i16(point_b);
+        let along = dot_product(ax, ay, bx, by, px, py);
+        let left = dot_product(bx, by, ax, ay, px, py);
+        let outside = cross(bx, by, ax, ay, px, py);
         // 5.7-2: the foot of the perpendicular lies on this edge and the point is not inside of it.
-        if (position == 1u && cross(ax, ay, bx, by, px, py) <= 0) {
-            let along = dot_product(ax, ay, bx, by, px, py);
+        if ((along | left | outside) >= 0) {
             let reciprocal = word(hull + edge * 2u + 1u);
             let weight_b = ratio_q15(along, first >> 16u, reciprocal, ONE_Q15);
             return beyond_hull(start, direction, a, b, weight_b);
         }
         // 5.7-3: between two edges: past the end of the one, before the begin of the other.
-        if (past_previous && position == 0u) {
+        if (past_previous && along < 0) {
             corner = a;
         }
-        past_previous = position == 2u;
+        past_previous = left < 0;
         first = second;
         a = b;
-        ax = bx;
-        ay = by;
+        point_a = point_b;
         edge += 1u;
     }
     return beyond_hull(start, direction, corner, corner, 0);
@@ -236,18 +237,6 @@ fn dot_product(ax: i32, ay: i32, bx: i32, by: i32, px: i32, py: i32) -> i32 {
     let first = (bx - ax) * (px - ax);
     let second = (by - ay) * (py - ay);
     return first + second;
-}
-
-// 0 if the foot of the perpendicular from p lies before the edge a to b, 1 on it, 2 past it (5.7-1).
-fn edge_position(ax: i32, ay: i32, bx: i32, by: i32, px: i32, py: i32) -> u32 {
-    // 5.7-1: measured from both ends, so that no squared length is needed.
-    if (dot_product(ax, ay, bx, by, px, py) < 0) {
-        return 0u;
-    }
-    if (dot_product(bx, by, ax, ay, px, py) < 0) {
-        return 2u;
-    }
-    return 1u;
 }
 
 // Two directions of the hull, and the cosine beyond it (5.7-5).

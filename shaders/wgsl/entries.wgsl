@@ -34,7 +34,7 @@ fn direction_of_bits(words: array<u32, 3>) -> Direction {
 
 // One texel and one pair of sample directions: light[0] and view[0] are their indices.
 @compute @workgroup_size(64)
-fn point(@builtin(global_invocation_id) id: vec3<u32>) {
+fn texel(@builtin(global_invocation_id) id: vec3<u32>) {
     if (id.x >= arrayLength(&queries)) {
         return;
     }

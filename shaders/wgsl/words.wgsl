@@ -16,6 +16,18 @@ fn packed_i16(start: u32, index: u32) -> i32 {
     return i32(pair << (16u - ((index & 1u) << 4u))) >> 16u;
 }
 
+// The low half of a word with its sign (1.2-2).
+fn low_i16(pair: u32) -> i32 {
+    // 1.2-2: up, then back with its sign.
+    return i32(pair << 16u) >> 16u;
+}
+
+// The high half of a word with its sign (1.2-2).
+fn high_i16(pair: u32) -> i32 {
+    // 1.2-2: the shift keeps the sign.
+    return i32(pair) >> 16u;
+}
+
 // 32 bits that begin at bit `bit` of the stream at word `start`, lowest bit first (1.2-3).
 fn bit_window(start: u32, bit: u32) -> u32 {
     let index = start + (bit >> 5u);
