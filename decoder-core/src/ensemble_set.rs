@@ -269,17 +269,17 @@ fn scan_record(bytes: &[u8], list: &[[u8; 8]], layout: Layout) -> Scan {
     let mut field_bit = fields;
     let mut ones = Ones::new(bytes, highs, end);
     let mut scan = Scan { count: 0, end: highs, sum: 0, ascends: true, beyond: None };
-    let mut next = 0u32;
+    let mut next = 0u64;
     while scan.count < count {
         let Some(place) = ones.next() else { break };
         scan.end = place + 1;
         let high = place - highs - scan.count;
         let field = window(bytes, field_bit) as u32;
         field_bit += low_bits + value_bits;
-        // A high part beyond all atoms must not wrap back to one.
-        let position = if high < ATOM_LIMIT { high << low_bits | field & low_mask } else { u32::MAX };
-        let Some(&[a, _, _, _, b0, b1, s0, s1]) = list.get(position as usize) else {
-            scan.beyond = Some(position);
+        // 64 bits: a high part beyond all atoms must not wrap back to one.
+        let position = (high as u64) << low_bits | (field & low_mask) as u64;
+        let Some(&[a, _, _, _, b0, b1, s0, s1]) = usize::try_from(position).ok().and_then(|at| list.get(at)) else {
+            scan.beyond = Some(position as u32);
             break;
         };
         scan.ascends &= position >= next;

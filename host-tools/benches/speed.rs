@@ -113,9 +113,9 @@ fn main() {
         black_box(&image);
     }));
 
-    // A file of about 5 MB: the same records over a larger image, coefficients twice over.
+    // A file of about 5 MB: the same records over a taller image.
     let mut model = authors.to_model(10).expect("model");
-    let repeat = (5_000_000 / bytes.len().min(900_000)) as u32;
+    let repeat = (5_000_000 / 400_000).min(16_000 / model.size[1]);
     model.size[1] *= repeat;
     for ensemble in model.channels.iter_mut().filter_map(|channel| channel.ensemble.as_mut()) {
         let records = &mut ensemble.coefficients[0][0].records;
@@ -128,4 +128,5 @@ fn main() {
         black_box(selvedge::open(&large, &Limits::NONE)).expect("legal");
     });
     println!("open, bytes of a file of {} bytes          {}", large.len(), open);
+    println!("  so a file of 5,000,000 bytes of this kind opens in 5 s / (M/s)");
 }

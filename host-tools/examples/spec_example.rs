@@ -1,0 +1,11 @@
+//! Prints the worked example of the specification, part by part, as hex dumps: what `spec/` shows.
+//!
+//!     cargo run -p selvedge-tools --example spec_example
+
+use selvedge_tools::{example::example_model, write::write_material};
+
+fn main() {
+    for (name, bytes, offset) in selvedge_tools::example::parts(&write_material(&example_model())) {
+        println!("{name}\n{}", selvedge_tools::example::hex_dump(&bytes, offset));
+    }
+}
