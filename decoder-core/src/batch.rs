@@ -443,7 +443,7 @@ impl<'a, 's> ReadySet<'a, 's> {
                     weight_a_q15: weight_a,
                     weight_b_q15: weight_b,
                     weight_c_q15: ONE_Q15.wrapping_sub(weight_a).wrapping_sub(weight_b),
-                    cosine_q15: ONE_Q15,
+                    cosine_q15: if direction.z_q15 > 0 { ONE_Q15 } else { 0 },
                 };
             }
         }

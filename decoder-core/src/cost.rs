@@ -36,7 +36,7 @@ pub struct Shape {
 pub fn filtered_operations(shape: Shape, records: u64) -> u32 {
     let [light, view] = [0, 1].map(|i| locate_operations(shape.candidates[i], shape.hull_counts[i]));
     let axes = 18;
-    let colour = 48;
+    let colour = 102;
     let sum = axes + light + view + 15 * shape.means as u64 + 17 * shape.scales as u64 + 4 * records + colour;
     sum.min(u32::MAX as u64) as u32
 }

@@ -40,7 +40,7 @@ pub struct Taps {
     pub weight_b_q15: i32,
     /// Weight of the third.
     pub weight_c_q15: i32,
-    /// Cosine asked for over cosine sampled: `ONE_Q15` within the hull, less beyond it.
+    /// Cosine asked for over cosine sampled: `ONE_Q15` within the hull, less beyond it, zero below the horizon.
     pub cosine_q15: i32,
 }
 
@@ -74,10 +74,10 @@ pub fn project_q14(n: i32, d: u32) -> i32 {
 pub fn direction_from_binary32(x_bits: u32, y_bits: u32, z_bits: u32) -> Direction {
     let x_q30 = binary32_to_q30(x_bits);
     let y_q30 = binary32_to_q30(y_bits);
-    // 5.2-3: below the horizon the point is that of the horizon and the cosine is zero.
-    let z_q30 = binary32_to_q30(z_bits).max(0);
-    let d = (ONE_Q30 as u32).wrapping_add(z_q30 as u32);
-    Direction { x_q14: project_q14(x_q30, d), y_q14: project_q14(y_q30, d), z_q15: round_shift(z_q30, 15) }
+    let z_q30 = binary32_to_q30(z_bits);
+    // 5.2-3: below the horizon the point is that of the mirrored vector and the cosine is zero.
+    let d = (ONE_Q30 as u32).wrapping_add(z_q30.unsigned_abs());
+    Direction { x_q14: project_q14(x_q30, d), y_q14: project_q14(y_q30, d), z_q15: round_shift(z_q30.max(0), 15) }
 }
 
 /// The direction with every part within its range (5.1-2).
@@ -190,7 +190,9 @@ pub fn locate(words: Words<'_>, start: u32, asked: Direction) -> Taps {
             let weight_a = ratio_q15(area_a, shift, reciprocal, ONE_Q15);
             let weight_b = ratio_q15(area_b, shift, reciprocal, ONE_Q15.wrapping_sub(weight_a));
             let weight_c = ONE_Q15.wrapping_sub(weight_a).wrapping_sub(weight_b);
-            return Taps { a, b, c, weight_a_q15: weight_a, weight_b_q15: weight_b, weight_c_q15: weight_c, cosine_q15: ONE_Q15 };
+            // 5.6-3: at and below the horizon no light arrives.
+            let cosine = if direction.z_q15 > 0 { ONE_Q15 } else { 0 };
+            return Taps { a, b, c, weight_a_q15: weight_a, weight_b_q15: weight_b, weight_c_q15: weight_c, cosine_q15: cosine };
         }
         candidate = candidate.wrapping_add(1);
     }
@@ -261,9 +263,9 @@ pub fn beyond_hull(words: Words<'_>, start: u32, direction: Direction, a: u32, b
     let weight_a = ONE_Q15.wrapping_sub(weight_b);
     let za = point_z_q15(words, start, a).wrapping_mul(weight_a);
     let zb = point_z_q15(words, start, b).wrapping_mul(weight_b);
-    // 5.7-5: z over the clamped z, and one where the clamped z is not larger.
+    // 5.7-5: z over the clamped z, and one where the clamped z is not larger; zero at the horizon (5.6-3).
     let sampled = za.wrapping_add(zb).wrapping_add(HALF_Q15) >> 15;
-    let mut cosine = ONE_Q15;
+    let mut cosine = if direction.z_q15 > 0 { ONE_Q15 } else { 0 };
     if direction.z_q15 < sampled {
         cosine = divide_q15(direction.z_q15 as u32, sampled as u32) as i32;
     }
@@ -294,8 +296,9 @@ mod tests {
             ([1.0, 0.0, 0.0], (ONE_Q14, 0, 0)),
             ([0.0, -1.0, 0.0], (0, -ONE_Q14, 0)),
             ([0.6, 0.0, 0.8], (5461, 0, 26214)),
-            ([0.6, 0.0, -0.8], (9830, 0, 0)),
-            ([f32::NAN, f32::INFINITY, f32::NEG_INFINITY], (ONE_Q14, ONE_Q14, 0)),
+            ([0.6, 0.0, -0.8], (5461, 0, 0)),
+            ([0.0, 0.0, -1.0], (0, 0, 0)),
+            ([f32::NAN, f32::INFINITY, f32::NEG_INFINITY], (ONE_Q14 / 2, ONE_Q14 / 2, 0)),
         ] {
             let [x, y, z] = vector.map(f32::to_bits);
             let got = direction_from_binary32(x, y, z);

@@ -268,28 +268,30 @@ fn scan_record(bytes: &[u8], list: &[[u8; 8]], layout: Layout) -> Scan {
     let half = (1u32 << value_bits) >> 1;
     let mut field_bit = fields;
     let mut ones = Ones::new(bytes, highs, end);
-    let mut scan = Scan { count: 0, end: highs, sum: 0, ascends: true, beyond: None };
+    // Locals, not fields of the result, so that they stay in registers.
+    let (mut count_so_far, mut last, mut sum, mut ascends, mut beyond) = (0u32, highs, 0i32, true, None);
     let mut next = 0u64;
-    while scan.count < count {
+    while count_so_far < count {
         let Some(place) = ones.next() else { break };
-        scan.end = place + 1;
-        let high = place - highs - scan.count;
+        last = place + 1;
+        let high = place - highs - count_so_far;
         let field = window(bytes, field_bit) as u32;
         field_bit += low_bits + value_bits;
         // 64 bits: a high part beyond all atoms must not wrap back to one.
         let position = (high as u64) << low_bits | (field & low_mask) as u64;
         let Some(&[a, _, _, _, b0, b1, s0, s1]) = usize::try_from(position).ok().and_then(|at| list.get(at)) else {
-            scan.beyond = Some(position as u32);
+            beyond = Some(position as u32);
             break;
         };
-        scan.ascends &= position >= next;
+        ascends &= position >= next;
         next = position + 1;
         let step = u16::from_le_bytes([s0, s1]) as u32;
         let value = (field >> low_bits) & value_mask;
         let coefficient = i16::from_le_bytes([b0, b1]) as i32 + ((value * step + half) >> value_bits) as i32;
-        let atom_shift = a & 0xf;
-        scan.sum += (coefficient.unsigned_abs() + (1 << atom_shift) - 1) >> atom_shift;
-        scan.count += 1;
+        // The floor of the negative magnitude is the ceiling of the magnitude, negated.
+        let negative = coefficient.min(-coefficient);
+        sum -= negative >> (a & 0xf);
+        count_so_far += 1;
     }
-    scan
+    Scan { count: count_so_far, end: last, sum: sum as u32, ascends, beyond }
 }

@@ -80,13 +80,35 @@ pub fn channel_q20(words: Words<'_>, material: &Material, channel: Channel, leve
     clamp_magnitude(texture.wrapping_add(mean), VALUE_BOUND)
 }
 
+/// Channel `number` of a material (8.3).
+pub fn channel_of(material: &Material, number: u32) -> Channel {
+    // 8.3-4: by comparison, so that no index can be out of range.
+    if number == 0 {
+        return material.channels[0];
+    }
+    if number == 1 {
+        return material.channels[1];
+    }
+    material.channels[2]
+}
+
 /// The values of all channels at one level (8.3).
 pub fn level_values(words: Words<'_>, material: &Material, level: u32, x: Axis, y: Axis, light: Taps, view: Taps) -> Values {
-    Values {
-        c0: channel_q20(words, material, material.channels[0], level, x, y, light, view),
-        c1: channel_q20(words, material, material.channels[1], level, x, y, light, view),
-        c2: channel_q20(words, material, material.channels[2], level, x, y, light, view),
+    let mut values = Values { c0: 0, c1: 0, c2: 0 };
+    // 8.3-4: a loop, so that a compiler for GPUs makes one copy of a channel.
+    for number in 0..3u32 {
+        let value = channel_q20(words, material, channel_of(material, number), level, x, y, light, view);
+        if number == 0 {
+            values.c0 = value;
+        }
+        if number == 1 {
+            values.c1 = value;
+        }
+        if number == 2 {
+            values.c2 = value;
+        }
     }
+    values
 }
 
 /// Values between two texels of each axis of one level (8.4).
@@ -108,17 +130,15 @@ pub fn trilinear_values(words: Words<'_>, material: &Material, level_q16: u32, u
     let limited = level_q16.min(material.level_count.wrapping_sub(1) << 16);
     let level = limited >> 16;
     let fraction_q15 = ((limited & 0xffff) >> 1) as i32;
-    let fine = filtered_values(words, material, level, u_q32, v_q32, light, view);
+    let mut values = filtered_values(words, material, level, u_q32, v_q32, light, view);
     // 9.2-2: on a level nothing else is read.
-    if fraction_q15 == 0 {
-        return fine;
+    if fraction_q15 != 0 {
+        let coarse = filtered_values(words, material, level.wrapping_add(1), u_q32, v_q32, light, view);
+        values.c0 = between(values.c0, coarse.c0, fraction_q15);
+        values.c1 = between(values.c1, coarse.c1, fraction_q15);
+        values.c2 = between(values.c2, coarse.c2, fraction_q15);
     }
-    let coarse = filtered_values(words, material, level.wrapping_add(1), u_q32, v_q32, light, view);
-    Values {
-        c0: between(fine.c0, coarse.c0, fraction_q15),
-        c1: between(fine.c1, coarse.c1, fraction_q15),
-        c2: between(fine.c2, coarse.c2, fraction_q15),
-    }
+    values
 }
 
 /// Values of one texel of level 0 for one pair of sample directions (8.5).

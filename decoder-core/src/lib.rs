@@ -53,7 +53,6 @@ pub mod directory;
 pub mod ensemble;
 pub mod ensemble_set;
 pub mod error;
-mod exp2_table;
 pub mod fixed;
 pub mod header;
 #[cfg(feature = "batch")]

@@ -7,11 +7,18 @@
 #[inline(always)]
 pub(crate) fn window(stream: &[u8], bit: u32) -> u64 {
     let from = (bit >> 3) as usize;
-    match stream.get(from..) {
-        Some([a, b, c, d, e, f, g, h, ..]) => u64::from_le_bytes([*a, *b, *c, *d, *e, *f, *g, *h]) >> (bit & 7),
-        Some(rest) => rest.iter().rev().fold(0u64, |bits, &byte| bits << 8 | byte as u64) >> (bit & 7),
-        None => 0,
+    match stream.get(from..from.wrapping_add(8)) {
+        Some(&[a, b, c, d, e, f, g, h]) => u64::from_le_bytes([a, b, c, d, e, f, g, h]) >> (bit & 7),
+        _ => last_window(stream, bit),
     }
+}
+
+/// A window that begins less than eight bytes before the end, or after it.
+#[cold]
+#[inline(never)]
+fn last_window(stream: &[u8], bit: u32) -> u64 {
+    let rest = stream.get((bit >> 3) as usize..).unwrap_or(&[]);
+    rest.iter().take(8).rev().fold(0u64, |bits, &byte| bits << 8 | byte as u64) >> (bit & 7)
 }
 
 /// The places of the one bits of a stream.

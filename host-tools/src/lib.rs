@@ -1,3 +1,26 @@
-//! Host side of Selvedge.
-#![allow(missing_docs)]
-pub mod error; pub mod example; pub mod extreme; pub mod gpu; pub mod model; pub mod random; pub mod sparsebtf; pub mod triangulate; pub mod write;
+//! Host side of Selvedge: importers, the writer, checks, pictures, and the kernel on a GPU.
+//!
+//! | module | does |
+//! |---|---|
+//! | [`sparsebtf`] | reads the files of SparseBTF 2023 |
+//! | [`model`], [`write`](mod@write), [`triangulate`] | a quantised material in memory, and its bytes |
+//! | [`inspect`], [`picture`], [`demo`] | what `info`, `validate`, `decode` and `demo` show |
+//! | [`kernel`], [`gpu`] | the kernel for other renderers, and run here |
+//! | [`example`], [`extreme`], [`random`] | files that the specification and the tests use |
+//! | [`files`], [`error`] | whole writes, exit codes |
+
+pub mod demo;
+pub mod error;
+pub mod example;
+pub mod extreme;
+pub mod files;
+#[cfg(feature = "gpu")]
+pub mod gpu;
+pub mod inspect;
+pub mod kernel;
+pub mod model;
+pub mod picture;
+pub mod random;
+pub mod sparsebtf;
+pub mod triangulate;
+pub mod write;

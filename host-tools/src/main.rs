@@ -1,19 +1,244 @@
-use selvedge_tools::*;
-fn main(){
-  let g=gpu::Gpu::new(wgpu::Backends::VULKAN).unwrap().unwrap();
-  let m=sparsebtf::read_material(std::path::Path::new("/work/shared/data/sparsebtf"),"carpet07",None).unwrap();
-  let b=write::write_material(&m.to_model(10).unwrap());
-  let mats=vec![selvedge::open(&b,&selvedge::Limits::NONE).unwrap()];
-  let loaded=g.load(&mats);
-  let mut r=random::Random::new(1);
-  for entry in ["point","filtered","trilinear","floats"] {
-  for n in [64usize, 200_000] {
-  let q:Vec<gpu::Query>=(0..n).map(|i|{ let mut w=||r.word() as i32; let mut d=||[(w()>>17) as u32,(w()>>17) as u32,(w()>>16) as u32]; let l=d(); let v=d();
-     gpu::Query{material:0,u:r.word(),v:r.word(),level_q16:r.word()>>14,light:l,view:v}}).collect();
-  let t=std::time::Instant::now();
-  let a=g.answer(&loaded,entry,&q).unwrap();
-  let tg=t.elapsed(); let t=std::time::Instant::now();
-  let c:Vec<_>=q.iter().map(|q|gpu::answer_on_cpu(&mats[q.material as usize],entry,q)).collect();
-  println!("{entry} {n} gpu {tg:?} cpu {:?} differ {}", t.elapsed(), a.iter().zip(&c).filter(|(a,b)|a!=b).count());
-  }}
+//! The program `selvedge`: data to stdout, the rest to stderr; silent where a check succeeds.
+//!
+//! Exit codes: 0 good, 1 bad usage, 2 I/O, 3 invalid file, 4 over limits, 5 unsupported.
+
+use clap::{Args, Parser, Subcommand};
+use selvedge::{Direction, Limits};
+use selvedge_tools::error::{Result, ToolError};
+use selvedge_tools::{demo, files, inspect, kernel, sparsebtf, write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Compressed measured materials: import, check, decode.
+#[derive(Parser)]
+#[command(version, about, after_help = "Exit codes: 0 good, 1 bad usage, 2 I/O, 3 invalid file, 4 over limits, 5 unsupported.")]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// The whole story on a built-in material: files, checks, pictures and a page
+    Demo {
+        /// Folder for the results
+        #[arg(long)]
+        out: PathBuf,
+    },
+    /// Make a file of a folder of SparseBTF .bin files, without encoding anew
+    Import {
+        /// Folder with Coeffs_BTF_NAME_1e-05_{Y,U,V}.bin, DictEnsOrth4D*.bin, NAME_mean_std.bin and xyz_loc.bin
+        folder: PathBuf,
+        /// The material, if the folder has several
+        #[arg(long)]
+        material: Option<String>,
+        /// Blocks along x and y, if the image is not square, as 40x30
+        #[arg(long, value_parser = parse_blocks)]
+        blocks: Option<[usize; 2]>,
+        /// Bits of a quantised coefficient, 1 to 16
+        #[arg(long, default_value_t = demo::VALUE_BITS, value_parser = clap::value_parser!(u32).range(1..=16))]
+        value_bits: u32,
+        /// The file to write
+        #[arg(short, long)]
+        output: PathBuf,
+        /// Put the dictionaries into a file of their own
+        #[arg(long)]
+        dictionary: Option<PathBuf>,
+    },
+    /// Say what a file is
+    Info {
+        #[command(flatten)]
+        source: Source,
+        /// As JSON
+        #[arg(long)]
+        json: bool,
+    },
+    /// Check files against every rule of the specification; silent when good
+    Validate {
+        /// Files, - for standard input
+        #[arg(required = true)]
+        files: Vec<PathBuf>,
+        /// The external dictionary of the files
+        #[arg(long)]
+        dictionary: Option<PathBuf>,
+        #[command(flatten)]
+        limits: LimitArgs,
+        /// As JSON
+        #[arg(long)]
+        json: bool,
+    },
+    /// Write the image for one light and one view as .png or .exr
+    Decode {
+        #[command(flatten)]
+        source: Source,
+        /// The picture to write
+        #[arg(short, long)]
+        output: PathBuf,
+        /// Light: angle from the normal and azimuth, degrees
+        #[arg(long, default_value = "30,0", value_parser = parse_angles, allow_hyphen_values = true)]
+        light: Direction,
+        /// View: angle from the normal and azimuth, degrees
+        #[arg(long, default_value = "0,0", value_parser = parse_angles, allow_hyphen_values = true)]
+        view: Direction,
+        /// Level of detail
+        #[arg(long, default_value_t = 0)]
+        level: u32,
+        /// Quality layers to decode
+        #[arg(long)]
+        layers: Option<u32>,
+        /// Factor for .png; .exr has the decoder's bits
+        #[arg(long, default_value_t = 1.0)]
+        exposure: f32,
+    },
+    /// Write the decoder's kernel as WGSL, SPIR-V, MSL, HLSL and GLSL, with its bindings
+    Kernel {
+        /// Folder for the files; without it the WGSL goes to stdout
+        #[arg(long)]
+        out: Option<PathBuf>,
+    },
+}
+
+/// A material and its dictionary.
+#[derive(Args)]
+struct Source {
+    /// The file, - for standard input
+    file: PathBuf,
+    /// Its external dictionary
+    #[arg(long)]
+    dictionary: Option<PathBuf>,
+    #[command(flatten)]
+    limits: LimitArgs,
+}
+
+#[derive(Args)]
+struct LimitArgs {
+    /// Refuse files of more bytes
+    #[arg(long, default_value_t = Limits::default().bytes)]
+    max_bytes: u32,
+    /// Refuse files whose samples cost more operations
+    #[arg(long, default_value_t = Limits::default().operations)]
+    max_operations: u32,
+}
+
+impl LimitArgs {
+    fn limits(&self) -> Limits {
+        Limits { bytes: self.max_bytes, operations: self.max_operations }
+    }
+}
+
+fn parse_blocks(text: &str) -> std::result::Result<[usize; 2], String> {
+    let parts: Option<Vec<usize>> = text.split('x').map(|n| n.parse().ok().filter(|n| (1..=1638).contains(n))).collect();
+    parts.and_then(|parts| parts.try_into().ok()).ok_or_else(|| "two numbers from 1 to 1638, as 40x30".into())
+}
+
+fn parse_angles(text: &str) -> std::result::Result<Direction, String> {
+    let parts: Option<Vec<f64>> = text.split(',').map(|n| n.trim().parse().ok().filter(|n: &f64| n.is_finite())).collect();
+    let Some(Ok([polar, azimuth])) = parts.map(<[f64; 2]>::try_from) else {
+        return Err("two numbers, as 30,90".into());
+    };
+    let (polar, azimuth) = (polar.to_radians(), azimuth.to_radians());
+    Ok(Direction::from_unit_vector([(polar.sin() * azimuth.cos()) as f32, (polar.sin() * azimuth.sin()) as f32, polar.cos() as f32]))
+}
+
+/// A material's bytes, opened for as long as `use_it` runs.
+fn with_material<T>(source: &Source, use_it: impl FnOnce(selvedge::Selvedge<'_>) -> Result<T>) -> Result<T> {
+    let bytes = files::read(&source.file)?;
+    let dictionary = source.dictionary.as_deref().map(files::read).transpose()?;
+    let opened = selvedge::open_with(&bytes, dictionary.as_deref(), &source.limits.limits());
+    use_it(opened.map_err(|finding| ToolError::Invalid { path: source.file.clone(), finding })?)
+}
+
+fn import(folder: &Path, material: Option<String>, blocks: Option<[usize; 2]>, value_bits: u32, output: &Path, dictionary: Option<&Path>) -> Result<()> {
+    let name = match material {
+        Some(name) => name,
+        None => match sparsebtf::materials_in(folder)?.as_slice() {
+            [only] => only.clone(),
+            [] => return Err(ToolError::Usage(format!("{}: no Coeffs_BTF_NAME_1e-05_U.bin", folder.display()))),
+            several => return Err(ToolError::Usage(format!("--material says which: {}", several.join(", ")))),
+        },
+    };
+    let model = sparsebtf::read_material(folder, &name, blocks)?.to_model(value_bits)?;
+    let Some(dictionary) = dictionary else {
+        return files::write(output, &write::write_material(&model));
+    };
+    let (material, bytes) = write::write_split(&model);
+    files::write(dictionary, &bytes)?;
+    files::write(output, &material)
+}
+
+fn validate(paths: &[PathBuf], dictionary: Option<&Path>, limits: &Limits, json: bool) -> Result<u8> {
+    let dictionary = dictionary.map(files::read).transpose()?;
+    let mut reports = Vec::new();
+    for path in paths {
+        reports.push(inspect::validate(&path.display().to_string(), &files::read(path)?, dictionary.as_deref(), limits));
+    }
+    let code = reports.iter().map(|report| report.exit_code).find(|&code| code != 0).unwrap_or(0);
+    if json {
+        println!("{}", serde_json::to_string_pretty(&reports).expect("plain data"));
+        return Ok(code);
+    }
+    for report in reports {
+        for finding in &report.findings {
+            let part = if finding.part == "dictionary" { " (dictionary)" } else { "" };
+            println!("{}{part}: {} at byte {}: {}; found {} ({:#x})", report.file, finding.rule, finding.offset, finding.title, finding.found, finding.found);
+        }
+        if report.count > report.findings.len() {
+            println!("{}: {} findings in all", report.file, report.count);
+        }
+    }
+    Ok(code)
+}
+
+fn run(cli: Cli) -> Result<u8> {
+    match cli.command {
+        Command::Demo { out } => demo::run(&out, &mut |line| eprintln!("{line}")).map(|()| 0),
+        Command::Import { folder, material, blocks, value_bits, output, dictionary } => {
+            import(&folder, material, blocks, value_bits, &output, dictionary.as_deref()).map(|()| 0)
+        }
+        Command::Info { source, json } => with_material(&source, |material| {
+            let info = inspect::info(&material);
+            if json {
+                println!("{}", serde_json::to_string_pretty(&info).expect("plain data"));
+            } else {
+                print!("{}", inspect::info_text(&info));
+            }
+            Ok(0)
+        }),
+        Command::Validate { files, dictionary, limits, json } => validate(&files, dictionary.as_deref(), &limits.limits(), json),
+        Command::Decode { source, output, light, view, level, layers, exposure } => with_material(&source, |material| {
+            let material = layers.map_or(material, |layers| material.with_layers(layers));
+            let picture = demo::decode_picture(&material, level, light, view)?;
+            let is_exr = output.extension().is_some_and(|ending| ending == "exr");
+            let picture = if is_exr { picture } else { picture.exposed(exposure) };
+            picture.save(&output).map(|()| 0)
+        }),
+        Command::Kernel { out } => {
+            let translated = kernel::translate()?;
+            match out {
+                Some(folder) => {
+                    std::fs::create_dir_all(&folder).map_err(ToolError::io(&folder))?;
+                    translated.iter().try_for_each(|(name, bytes)| files::write(&folder.join(name), bytes))?;
+                }
+                None => files::write(Path::new("-"), &translated[0].1)?,
+            }
+            Ok(0)
+        }
+    }
+}
+
+fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            let _ = error.print();
+            return ExitCode::from(if error.use_stderr() { 1 } else { 0 });
+        }
+    };
+    match run(cli) {
+        Ok(code) => ExitCode::from(code),
+        Err(error) => {
+            eprintln!("selvedge: {error}");
+            ExitCode::from(error.exit_code())
+        }
+    }
 }

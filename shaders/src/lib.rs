@@ -57,7 +57,6 @@ macro_rules! module {
 pub const SHARED: &[Module] = &[
     module!("words"),
     module!("material"),
-    module!("exp2_table"),
     module!("fixed"),
     module!("direction"),
     module!("position"),

@@ -60,10 +60,10 @@ fn project_q14(n: i32, d: u32) -> i32 {
 fn direction_from_binary32(x_bits: u32, y_bits: u32, z_bits: u32) -> Direction {
     let x_q30 = binary32_to_q30(x_bits);
     let y_q30 = binary32_to_q30(y_bits);
-    // 5.2-3: below the horizon the point is that of the horizon and the cosine is zero.
-    let z_q30 = max(binary32_to_q30(z_bits), 0);
-    let d = u32(ONE_Q30) + u32(z_q30);
-    return Direction(project_q14(x_q30, d), project_q14(y_q30, d), round_shift(z_q30, 15u));
+    let z_q30 = binary32_to_q30(z_bits);
+    // 5.2-3: below the horizon the point is that of the mirrored vector and the cosine is zero.
+    let d = u32(ONE_Q30) + u32(abs(z_q30));
+    return Direction(project_q14(x_q30, d), project_q14(y_q30, d), round_shift(max(z_q30, 0), 15u));
 }
 
 // The direction with every part within its range (5.1-2).
@@ -174,7 +174,9 @@ fn locate(start: u32, asked: Direction) -> Taps {
             let weight_a = ratio_q15(area_a, shift, reciprocal, ONE_Q15);
             let weight_b = ratio_q15(area_b, shift, reciprocal, ONE_Q15 - weight_a);
             let weight_c = ONE_Q15 - weight_a - weight_b;
-            return Taps(a, b, c, weight_a, weight_b, weight_c, ONE_Q15);
+            // 5.6-3: at and below the horizon no light arrives. select(if false, if true, condition)
+            let cosine = select(0, ONE_Q15, direction.z_q15 > 0);
+            return Taps(a, b, c, weight_a, weight_b, weight_c, cosine);
         }
         candidate += 1u;
     }
@@ -244,9 +246,10 @@ fn beyond_hull(start: u32, direction: Direction, a: u32, b: u32, weight_b: i32) 
     let weight_a = ONE_Q15 - weight_b;
     let za = point_z_q15(start, a) * weight_a;
     let zb = point_z_q15(start, b) * weight_b;
-    // 5.7-5: z over the clamped z, and one where the clamped z is not larger.
+    // 5.7-5: z over the clamped z, and one where the clamped z is not larger; zero at the horizon (5.6-3).
     let sampled = (za + zb + HALF_Q15) >> 15u;
-    var cosine = ONE_Q15;
+    // select(if false, if true, condition)
+    var cosine = select(0, ONE_Q15, direction.z_q15 > 0);
     if (direction.z_q15 < sampled) {
         cosine = i32(divide_q15(u32(direction.z_q15), u32(sampled)));
     }

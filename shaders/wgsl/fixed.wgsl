@@ -9,8 +9,13 @@ const ONE_Q15: i32 = 32768;
 const HALF_Q15: i32 = 16384;
 // One half in Q13.
 const HALF_Q13: i32 = 4096;
-// round(ln 2 * 2^20): turns 12 fraction bits of a Q20 exponent into a Q40 natural exponent.
-const LN2_Q20: u32 = 726817u;
+// Coefficients of 2^x - 1 over the unit interval in Q32, fitted for the least relative error (2.3-2).
+const EXP2_C1: u32 = 0xb17215afu;
+const EXP2_C2: u32 = 0x3d7faaf3u;
+const EXP2_C3: u32 = 0x0e344889u;
+const EXP2_C4: u32 = 0x027a1725u;
+const EXP2_C5: u32 = 0x0051b593u;
+const EXP2_C6: u32 = 0x000e2a0cu;
 // The largest finite binary32.
 const BINARY32_MAX: u32 = 0x7f7fffffu;
 
@@ -37,7 +42,7 @@ fn round_shift(p: i32, shift: u32) -> i32 {
 
 // floor(a * b / 2^32) (2.2-4).
 fn product_high(a: u32, b: u32) -> u32 {
-    // 2.2-4: four 16-bit limb products; no partial sum exceeds 32 bits.
+    // 2.2-4: one wide product there, four of 16-bit limbs here; no partial sum exceeds 32 bits.
     let low = (a & 0xffffu) * (b & 0xffffu);
     let middle_a = (a >> 16u) * (b & 0xffffu) + (low >> 16u);
     let middle_b = (a & 0xffffu) * (b >> 16u) + (middle_a & 0xffffu);
@@ -68,12 +73,14 @@ fn clamp_magnitude(x: i32, bound: i32) -> i32 {
 
 // 2^31 * 2^fraction for a Q20 fraction below one: the mantissa, in [2^31, 2^32) (2.3-1).
 fn exp2_q31(fraction_q20: u32) -> u32 {
-    let entry = EXP2_Q31[(fraction_q20 >> 12u) & 0xffu];
-    // 2.3-1: y = x + x^2/2 of the 12 low bits; x < 2^-8.5, so the cubic term is below 2^-28.
-    let x_q40 = (fraction_q20 & 0xfffu) * LN2_Q20;
-    let x_q24 = x_q40 >> 16u;
-    let y_q40 = x_q40 + ((x_q24 * x_q24) >> 9u);
-    return entry + (product_high(entry, y_q40) >> 8u);
+    let x_q32 = fraction_q20 << 12u;
+    // 2.3-1: Horner's rule; every sum stays below 2^32, since all coefficients together are 2 - 1.
+    let y5 = EXP2_C5 + product_high(EXP2_C6, x_q32);
+    let y4 = EXP2_C4 + product_high(y5, x_q32);
+    let y3 = EXP2_C3 + product_high(y4, x_q32);
+    let y2 = EXP2_C2 + product_high(y3, x_q32);
+    let y1 = EXP2_C1 + product_high(y2, x_q32);
+    return 0x80000000u + (product_high(y1, x_q32) >> 1u);
 }
 
 // The binary32 nearest to mantissa * 2^(exponent - 31), halves away from zero (2.4-1).

@@ -70,13 +70,35 @@ fn channel_q20(material: Material, channel: Channel, level: u32, x: Axis, y: Axi
     return clamp_magnitude(texture + mean, VALUE_BOUND);
 }
 
+// Channel `number` of a material (8.3).
+fn channel_of(material: Material, number: u32) -> Channel {
+    // 8.3-4: by comparison, so that no index can be out of range.
+    if (number == 0u) {
+        return material.channels[0];
+    }
+    if (number == 1u) {
+        return material.channels[1];
+    }
+    return material.channels[2];
+}
+
 // The values of all channels at one level (8.3).
 fn level_values(material: Material, level: u32, x: Axis, y: Axis, light: Taps, view: Taps) -> Values {
-    return Values(
-        channel_q20(material, material.channels[0], level, x, y, light, view),
-        channel_q20(material, material.channels[1], level, x, y, light, view),
-        channel_q20(material, material.channels[2], level, x, y, light, view),
-    );
+    var values = Values(0, 0, 0);
+    // 8.3-4: a loop, so that a compiler for GPUs makes one copy of a channel.
+    for (var number = 0u; number < 3u; number++) {
+        let value = channel_q20(material, channel_of(material, number), level, x, y, light, view);
+        if (number == 0u) {
+            values.c0 = value;
+        }
+        if (number == 1u) {
+            values.c1 = value;
+        }
+        if (number == 2u) {
+            values.c2 = value;
+        }
+    }
+    return values;
 }
 
 // Values between two texels of each axis of one level (8.4).
@@ -98,17 +120,15 @@ fn trilinear_values(material: Material, level_q16: u32, u_q32: u32, v_q32: u32, 
     let limited = min(level_q16, (material.level_count - 1u) << 16u);
     let level = limited >> 16u;
     let fraction_q15 = i32((limited & 0xffffu) >> 1u);
-    let fine = filtered_values(material, level, u_q32, v_q32, light, view);
+    var values = filtered_values(material, level, u_q32, v_q32, light, view);
     // 9.2-2: on a level nothing else is read.
-    if (fraction_q15 == 0) {
-        return fine;
+    if (fraction_q15 != 0) {
+        let coarse = filtered_values(material, level + 1u, u_q32, v_q32, light, view);
+        values.c0 = between(values.c0, coarse.c0, fraction_q15);
+        values.c1 = between(values.c1, coarse.c1, fraction_q15);
+        values.c2 = between(values.c2, coarse.c2, fraction_q15);
     }
-    let coarse = filtered_values(material, level + 1u, u_q32, v_q32, light, view);
-    return Values(
-        between(fine.c0, coarse.c0, fraction_q15),
-        between(fine.c1, coarse.c1, fraction_q15),
-        between(fine.c2, coarse.c2, fraction_q15),
-    );
+    return values;
 }
 
 // Values of one texel of level 0 for one pair of sample directions (8.5).

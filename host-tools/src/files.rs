@@ -1,0 +1,34 @@
+//! Files in and out: whole reads, and writes that leave either the old file or the new one.
+
+use crate::error::{Result, ToolError};
+use std::io::{Read as _, Write as _};
+use std::path::Path;
+
+/// A whole file; `-` is standard input.
+pub fn read(path: &Path) -> Result<Vec<u8>> {
+    if path == Path::new("-") {
+        let mut bytes = Vec::new();
+        std::io::stdin().read_to_end(&mut bytes).map_err(ToolError::io(path))?;
+        return Ok(bytes);
+    }
+    std::fs::read(path).map_err(ToolError::io(path))
+}
+
+/// Writes beside the file, then renames: nobody ever sees half of it. `-` is standard output.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    if path == Path::new("-") {
+        return std::io::stdout().write_all(bytes).map_err(ToolError::io(path));
+    }
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut beside = tempfile::Builder::new().prefix(".selvedge-").tempfile_in(folder).map_err(ToolError::io(path))?;
+    beside.write_all(bytes).and_then(|()| beside.as_file().sync_all()).map_err(ToolError::io(path))?;
+    // A temporary file is private; a result has the permissions that a new file would have.
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        let mode = std::fs::metadata(path).map_or(0o644, |old| old.permissions().mode());
+        beside.as_file().set_permissions(std::fs::Permissions::from_mode(mode)).map_err(ToolError::io(path))?;
+    }
+    beside.persist(path).map_err(|error| ToolError::io(path)(error.error))?;
+    Ok(())
+}

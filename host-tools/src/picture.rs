@@ -1,0 +1,102 @@
+//! Pictures: linear radiance to PNG and EXR, false colour, and tiles side by side. Presentation only.
+
+use crate::error::{Result, ToolError};
+use crate::files;
+use std::path::Path;
+
+/// Linear RGB, row by row.
+#[derive(Clone, Debug, Default)]
+pub struct Picture {
+    /// Width.
+    pub width: usize,
+    /// Height.
+    pub height: usize,
+    /// Linear radiance, or display values for false colour.
+    pub pixels: Vec<[f32; 3]>,
+}
+
+/// The sRGB transfer, to 8 bits.
+fn to_srgb8(linear: f32) -> u8 {
+    let c = linear.clamp(0.0, 1.0);
+    let encoded = if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 };
+    (encoded * 255.0 + 0.5) as u8
+}
+
+/// Black, blue, magenta, orange, white for 0 to 1: monotonic in lightness.
+pub fn false_colour(value: f32) -> [f32; 3] {
+    const STOPS: [[f32; 3]; 5] = [[0.0, 0.0, 0.02], [0.02, 0.04, 0.35], [0.45, 0.02, 0.35], [0.95, 0.4, 0.03], [1.0, 0.98, 0.85]];
+    let at = value.clamp(0.0, 1.0) * 4.0;
+    let low = (at as usize).min(3);
+    let part = at - low as f32;
+    std::array::from_fn(|c| STOPS[low][c] * (1.0 - part) + STOPS[low + 1][c] * part)
+}
+
+impl Picture {
+    /// From a function of the pixel.
+    pub fn from_fn(width: usize, height: usize, pixel: impl Fn(usize, usize) -> [f32; 3]) -> Picture {
+        Picture { width, height, pixels: (0..width * height).map(|i| pixel(i % width, i / width)).collect() }
+    }
+
+    /// Every pixel as a square of `factor` pixels.
+    pub fn enlarged(&self, factor: usize) -> Picture {
+        Picture::from_fn(self.width * factor, self.height * factor, |x, y| self.pixels[y / factor * self.width + x / factor])
+    }
+
+    /// Times a factor.
+    pub fn exposed(mut self, factor: f32) -> Picture {
+        self.pixels.iter_mut().flatten().for_each(|c| *c *= factor);
+        self
+    }
+
+    /// Several of one height side by side, with a gap.
+    pub fn beside(tiles: &[Picture], gap: usize) -> Picture {
+        let width = tiles.iter().map(|tile| tile.width).sum::<usize>() + gap * tiles.len().saturating_sub(1);
+        let height = tiles.iter().map(|tile| tile.height).max().unwrap_or(0);
+        let mut all = Picture::from_fn(width, height, |_, _| [1.0; 3]);
+        let mut left = 0;
+        for tile in tiles {
+            for y in 0..tile.height {
+                let at = y * width + left;
+                all.pixels[at..at + tile.width].copy_from_slice(&tile.pixels[y * tile.width..(y + 1) * tile.width]);
+            }
+            left += tile.width + gap;
+        }
+        all
+    }
+
+    /// Bytes of an 8-bit sRGB PNG.
+    pub fn to_png(&self) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, self.width as u32, self.height as u32);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
+        let data: Vec<u8> = self.pixels.iter().flatten().map(|&c| to_srgb8(c)).collect();
+        let mut writer = encoder.write_header().expect("writing to memory");
+        writer.write_image_data(&data).expect("the size is that of the header");
+        writer.finish().expect("writing to memory");
+        bytes
+    }
+
+    /// Bytes of an EXR with 32-bit floats: the decoder's bits, unchanged.
+    pub fn to_exr(&self) -> Vec<u8> {
+        use exr::prelude::{Image, SpecificChannels, WritableImage as _};
+        let pixel = |at: exr::math::Vec2<usize>| {
+            let [r, g, b] = self.pixels[at.y() * self.width + at.x()];
+            (r, g, b)
+        };
+        let image = Image::from_channels((self.width, self.height), SpecificChannels::rgb(pixel));
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        image.write().non_parallel().to_buffered(&mut bytes).expect("writing to memory");
+        bytes.into_inner()
+    }
+
+    /// Writes a PNG or an EXR, by the name's ending.
+    pub fn save(&self, path: &Path) -> Result<()> {
+        match path.extension().and_then(|ending| ending.to_str()) {
+            Some("png") => files::write(path, &self.to_png()),
+            Some("exr") => files::write(path, &self.to_exr()),
+            _ => Err(ToolError::Usage(format!("{}: pictures end in .png or .exr", path.display()))),
+        }
+    }
+}
