@@ -138,7 +138,7 @@ pub fn cross(ax: i32, ay: i32, bx: i32, by: i32, px: i32, py: i32) -> i32 {
 
 /// `part / whole` in Q15 by the stored reciprocal of the whole, halves up, at most `limit` (5.4-2).
 pub fn ratio_q15(part: i32, shift: u32, reciprocal: u32, limit: i32) -> i32 {
-    // 5.4-2: part >> shift has 16 bits or fewer and the product at most 2^31.
+    // 5.4-2: part >> shift has 16 bits or fewer and the product is below 2^31 + 2^16.
     let ratio = ((part as u32) >> shift).wrapping_mul(reciprocal).wrapping_add(HALF_Q15 as u32 * 2) >> 16;
     (ratio as i32).min(limit)
 }

@@ -28,11 +28,11 @@ struct Set {
 }
 
 /// Shift and reciprocal of a doubled area or a squared length, `1 <= whole <= 2^30` (5.4-4).
+///
+/// Rounded up, so that the whole over itself is one: a sample direction is met exactly.
 pub fn reciprocal_of(whole: u32) -> (u32, u32) {
     let shift = 16u32.saturating_sub(whole.leading_zeros());
-    // At most 2^31 for a whole of one, and about 2^16 once the shift is not zero.
-    let reciprocal = (1u64 << 31 << shift).checked_div(whole as u64).unwrap_or(0);
-    (shift, reciprocal as u32)
+    (shift, (1u32 << 31).div_ceil((whole >> shift).max(1)))
 }
 
 /// The cosine of a point of the disc, Q15 (5.3-4): `(1 - r^2) / (1 + r^2)`, halves up.
@@ -158,7 +158,8 @@ fn check_points(check: &mut Check<'_, '_>, set: &Set) -> bool {
     for i in 0..set.count {
         let (x, y) = set.point(check, i);
         let at = set.byte(set.start + 8 + i * 2);
-        let inside = x * x + y * y <= 1 << 28 && (x.abs() <= 16384 && y.abs() <= 16384);
+        // Within the square first: beyond it the sum of squares could overflow.
+        let inside = x.abs() <= 16384 && y.abs() <= 16384 && x * x + y * y <= 1 << 28;
         let differs = (0..i).all(|other| set.point(check, other) != (x, y));
         sound &= check.ensure(inside && differs, Rule::DirectionPoint, at, word(check.words, set.start + 8 + i * 2));
         let cosine = word(check.words, set.start + 9 + i * 2);

@@ -1,7 +1,8 @@
 //! Every rule that a file can break, and what a caller is told of it.
 //!
 //! A rule of the specification that `open` checks is one variant here, with the same number. The order
-//! of the variants is the order of the specification, which is the order of the checks.
+//! of the variants follows the order of the checks (1.4), which goes part by part: where rules are about
+//! the same entry they are held against it together.
 
 use core::fmt;
 
@@ -20,7 +21,7 @@ pub enum Family {
 
 macro_rules! rules {
     ($($(#[$doc:meta])* $name:ident $id:literal $family:ident $title:literal;)*) => {
-        /// A rule that `open` checks, in the order of the specification.
+        /// A rule that `open` checks, in the order in which parts of a file are reached.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
         #[non_exhaustive]
         pub enum Rule { $(#[doc = concat!($id, ": ", $title)] $name,)* }

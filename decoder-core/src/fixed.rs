@@ -25,7 +25,7 @@ pub const EXP2_C6: u32 = 0x000e_2a0c;
 /// The largest finite binary32.
 pub const BINARY32_MAX: u32 = 0x7f7f_ffff;
 
-/// `floor((p * u + 2^14) / 2^15)`, for `|u| <= 2^15` (2.2-1).
+/// `floor((p * u + 2^14) / 2^15)`, for `|u| <= 2^15`, and below it if `p` is -2^31 (2.2-1).
 ///
 /// Never larger in magnitude than `p`. The product has up to 47 bits; the two limbs of `p` keep each
 /// partial product within 32.

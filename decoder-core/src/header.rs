@@ -168,11 +168,16 @@ pub(crate) fn check_header(check: &mut Check<'_, '_>, limits: &Limits) -> Option
         check.ensure(found == 0, Rule::HeaderReserved, index.wrapping_mul(4), found);
     }
     if header.content == CONTENT_DICTIONARY {
-        for (offset, plain) in [(28, header.operations == 0), (32, header.width == 1), (36, header.height == 1), (48, header.level_count == 1), (53, header.layer_count == 1), (60, check.word_at(60) == 0), (64, parameter == 0), (68, header.matrix_q13 == [0; 9])] {
-            check.ensure(plain, Rule::DictionaryHeader, offset, check.word_at(offset & !3));
+        let plain = [(28, 0, header.operations), (32, 1, header.width), (36, 1, header.height), (48, 1, header.level_count), (53, 1, header.layer_count)];
+        for (offset, wanted, found) in plain {
+            check.ensure(found == wanted, Rule::DictionaryHeader, offset, found);
         }
         for (c, &state) in (0u32..).zip(&header.states) {
             check.ensure(state != 1, Rule::DictionaryHeader, 56u32.wrapping_add(c), state);
+        }
+        for index in 15u32..22 {
+            let found = check.word_at(index.wrapping_mul(4));
+            check.ensure(found == 0, Rule::DictionaryHeader, index.wrapping_mul(4), found);
         }
     }
     // 4.1: the price is compared before anything beyond the directory is touched.

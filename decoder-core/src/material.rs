@@ -83,7 +83,7 @@ pub struct Material {
 /// Words in a [`Material`].
 pub const MATERIAL_WORDS: usize = 48;
 
-/// Texels along an axis of `size` texels at `level`, halves rounded up (9.1-1).
+/// Texels along an axis of `size` texels at `level`: its share of the size, rounded up (9.1-1).
 pub fn level_size(size: u32, level: u32) -> u32 {
     // 9.1-1: never zero, since sizes are at least one.
     size.wrapping_add((1u32 << level).wrapping_sub(1)) >> level

@@ -162,8 +162,10 @@ fn walk_external(check: &mut Check<'_, '_>, header: &Header, dictionary: Option<
     let other = check.in_dictionary(|inner| walk_dictionary(inner, limits))?;
     let serves = (0..3).all(|c| !header.is_full(c) || other.is_full(c));
     let fits = other.method == header.method && other.light_count == header.light_count && other.view_count == header.view_count && serves;
-    let edge_needed = (0..3).any(|c| header.is_full(c) && find_section(check, header, SPATIAL, c).is_none());
-    let fits = fits && (!edge_needed || other.edge == header.edge);
+    // Spatial factors that the material does not have must be there, and for its edge.
+    let lacks = [0, 1, 2].map(|c| header.is_full(c) && find_section(check, header, SPATIAL, c).is_none());
+    let there = check.in_dictionary(|inner| (0u32..).zip(lacks).all(|(c, lacks)| !lacks || find_section(inner, &other, SPATIAL, c).is_some()));
+    let fits = fits && there && (!lacks.contains(&true) || other.edge == header.edge);
     check.ensure(fits, Rule::ExternalFit, section.offset, other.edge).then_some(Some(other))
 }
 
@@ -222,11 +224,7 @@ fn walk_ensemble(check: &mut Check<'_, '_>, header: &Header, external: Option<&H
         *slot = Some(match (find_section(check, header, SPATIAL, c), external) {
             (Some(section), _) => check_factors(check, section, header.edge, header.edge, header.edge)?,
             (None, Some(other)) => check.in_dictionary(|inner| {
-                let Some(section) = find_section(inner, other, SPATIAL, c) else {
-                    inner.find(Rule::ExternalFit, 0, c);
-                    return None;
-                };
-                let start = inner.section_start(section);
+                let start = inner.section_start(find_section(inner, other, SPATIAL, c)?);
                 Some(Factors { start, count: word(inner.words, start) })
             })?,
             (None, None) => return None,
@@ -235,7 +233,8 @@ fn walk_ensemble(check: &mut Check<'_, '_>, header: &Header, external: Option<&H
     for (c, ((angular, spatial), slot)) in (0u32..).zip(angular_of.iter().zip(&spatial_of).zip(atoms.iter_mut())) {
         let (Some(angular), Some(spatial)) = (*angular, *spatial) else { continue };
         let section = find_section(check, header, ATOMS, c)?;
-        if !check.ensure(spatial.count == angular.count, Rule::SpatialCounts, section.offset, spatial.count) {
+        let spatial_at = find_section(check, header, SPATIAL, c).unwrap_or(section).offset;
+        if !check.ensure(spatial.count == angular.count, Rule::SpatialCounts, spatial_at, spatial.count) {
             return None;
         }
         if !check_atoms(check, section, angular, spatial) {

@@ -5,7 +5,10 @@
 use selvedge_tools::{example::example_model, write::write_material};
 
 fn main() {
-    for (name, bytes, offset) in selvedge_tools::example::parts(&write_material(&example_model())) {
+    let file = write_material(&example_model());
+    let opened = selvedge::open(&file, &selvedge::Limits::NONE).expect("legal");
+    println!("decode digest {}\n", selvedge_tools::inspect::hex(&opened.decode_digest()));
+    for (name, bytes, offset) in selvedge_tools::example::parts(&file) {
         println!("{name}\n{}", selvedge_tools::example::hex_dump(&bytes, offset));
     }
 }

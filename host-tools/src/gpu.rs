@@ -72,6 +72,15 @@ pub fn answer_on_cpu(material: &Selvedge<'_>, entry: &str, query: &Query) -> Ans
     Answer::new(radiance(m, values, light), values)
 }
 
+/// Backends by name: `vulkan`, `gl`, or all for anything else.
+pub fn backends(name: &str) -> wgpu::Backends {
+    match name {
+        "vulkan" => wgpu::Backends::VULKAN,
+        "gl" => wgpu::Backends::GL,
+        _ => wgpu::Backends::all(),
+    }
+}
+
 /// An adapter with the kernel compiled.
 pub struct Gpu {
     device: wgpu::Device,

@@ -11,6 +11,7 @@ use crate::model::{
     TransferModel,
 };
 use crate::triangulate::project;
+use selvedge::pair_table::{BASE_BOUND, MEAN_SHIFT_LIMIT, SCALE_SHIFT_LIMIT};
 use std::collections::BTreeMap;
 use std::f64::consts::LN_2;
 use std::path::{Path, PathBuf};
@@ -314,12 +315,12 @@ impl AuthorsMaterial {
         for (c, channel) in channels.iter_mut().enumerate() {
             match &self.channels[c] {
                 Some(authors) => {
-                    channel.mean = Some(mean_table(&self.mean));
-                    channel.scale = Some(scale_table(&self.deviation));
+                    channel.mean = Some(mean_table(&self.mean)?);
+                    channel.scale = Some(scale_table(&self.deviation)?);
                     channel.ensemble = Some(quantise_channel(authors, &self.rows, value_bits)?);
                 }
                 // One unknown follows from the shared mean; two do not, and are left out.
-                None if missing == 1 => channel.mean = Some(mean_table(&self.channel_means(c))),
+                None if missing == 1 => channel.mean = Some(mean_table(&self.channel_means(c))?),
                 None => {}
             }
         }
@@ -352,21 +353,26 @@ impl AuthorsMaterial {
 }
 
 /// Means, natural logarithm to base two, over the smallest range of 16 bits that holds them.
-fn mean_table(means: &[f64]) -> PairTableModel {
+fn mean_table(means: &[f64]) -> Result<PairTableModel> {
     let q20: Vec<f64> = means.iter().map(|m| m / LN_2 * 1_048_576.0).collect();
     let (low, high) = q20.iter().fold((f64::MAX, f64::MIN), |(low, high), &q| (low.min(q), high.max(q)));
     let base = ((low + high) / 2.0).round();
-    let shift = (0..=11u32).find(|&s| (high - base) / 2f64.powi(s as i32) < 32_767.0).unwrap_or(11);
+    let shift = (0..=MEAN_SHIFT_LIMIT).find(|&s| (high - base) / 2f64.powi(s as i32) < 32_767.0);
+    let Some(shift) = shift.filter(|_| base.abs() <= BASE_BOUND as f64) else {
+        return Err(ToolError::Usage(format!("means from {low:e} to {high:e} are beyond the format")));
+    };
     let entries = q20.iter().map(|q| ((q - base) / 2f64.powi(shift as i32)).round().clamp(-32_767.0, 32_767.0) as i16).collect();
-    PairTableModel { base_q20: base as i32, shift, entries }
+    Ok(PairTableModel { base_q20: base as i32, shift, entries })
 }
 
 /// Scales, natural logarithm to base two.
-fn scale_table(scales: &[f64]) -> PairTableModel {
+fn scale_table(scales: &[f64]) -> Result<PairTableModel> {
     let largest = scales.iter().fold(0.0f64, |largest, s| largest.max(s.abs())) / LN_2;
-    let shift = (0..=8u32).find(|&s| largest / 2f64.powi(s as i32) < 0.999).unwrap_or(8);
+    let Some(shift) = (0..=SCALE_SHIFT_LIMIT).find(|&s| largest / 2f64.powi(s as i32) < 0.999) else {
+        return Err(ToolError::Usage(format!("a scale of {largest:e} is beyond the format")));
+    };
     let unit = 32_768.0 / 2f64.powi(shift as i32) / LN_2;
-    PairTableModel { base_q20: 0, shift, entries: scales.iter().map(|s| (s * unit).round().clamp(-32_767.0, 32_767.0) as i16).collect() }
+    Ok(PairTableModel { base_q20: 0, shift, entries: scales.iter().map(|s| (s * unit).round().clamp(-32_767.0, 32_767.0) as i16).collect() })
 }
 
 /// A column scaled to its largest entry, and that entry.

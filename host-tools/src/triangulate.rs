@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 pub struct Triangulation {
     /// Counter-clockwise, lowest direction first, ascending.
     pub triangles: Vec<[u32; 3]>,
-    /// The closed hull from its lowest direction; along a line and back for collinear points.
+    /// The closed hull from its lowest direction; for collinear points along the line from the lowest x, then y, and back.
     pub hull: Vec<u32>,
     /// Cells along an axis.
     pub grid_size: u32,
@@ -58,6 +58,11 @@ pub fn triangulate(points: &[[i32; 2]], grid_size: Option<u32>) -> Triangulation
     triangles.sort_unstable();
     let hull = if triangles.is_empty() { line_hull(points) } else { convex_hull(&triangles) };
     let grid_size = grid_size.unwrap_or_else(|| ((triangles.len() as f64 * 2.0).sqrt().ceil() as u32).clamp(1, 64));
+    with_grid(points, triangles, hull, grid_size)
+}
+
+/// Triangles and hull as they are, with the grid that lists where they meet its cells (5.5).
+pub fn with_grid(points: &[[i32; 2]], triangles: Vec<[u32; 3]>, hull: Vec<u32>, grid_size: u32) -> Triangulation {
     let mut starts = vec![0];
     let mut candidates = Vec::new();
     for cell_y in 0..grid_size {
@@ -135,10 +140,14 @@ fn line_hull(points: &[[i32; 2]]) -> Vec<u32> {
     along.into_iter().chain(back).collect()
 }
 
-/// The Q14 point of the disc nearest to a unit vector of the upper hemisphere (5.1-1).
+/// The Q14 point of the disc for a unit vector of the upper hemisphere: the nearest, or where that leaves the
+/// disc the one towards its centre (5.1-1).
 pub fn project(vector: glam::DVec3) -> [i32; 2] {
     let scale = 16384.0 / (1.0 + vector.z);
-    [(vector.x * scale).round() as i32, (vector.y * scale).round() as i32]
+    let exact = [vector.x * scale, vector.y * scale];
+    let nearest = exact.map(|c| c.round() as i32);
+    let inside = nearest[0] * nearest[0] + nearest[1] * nearest[1] <= 1 << 28;
+    if inside { nearest } else { exact.map(|c| c.trunc() as i32) }
 }
 
 /// The unit vector of a Q14 point of the disc.
@@ -186,6 +195,15 @@ mod tests {
                 assert!(points.iter().all(|&d| in_circle(a, b, c, d) <= 0));
             }
             assert_eq!(t.triangles.len() + 2 + t.hull.len(), 2 * points.len());
+        }
+    }
+
+    #[test]
+    fn the_horizon_is_in_the_disc() {
+        for tenth in 0..3600 {
+            let (y, x) = (tenth as f64 / 10.0).to_radians().sin_cos();
+            let [px, py] = project(glam::DVec3::new(x, y, 0.0));
+            assert!(px * px + py * py <= 1 << 28, "{tenth}");
         }
     }
 

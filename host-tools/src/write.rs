@@ -11,13 +11,29 @@ use selvedge::header::{CONTENT_DICTIONARY, CONTENT_MATERIAL, HEADER_LENGTH, MAGI
 use selvedge::{crc32, sha256};
 
 /// A section before layout.
-struct Part {
-    kind: u32,
-    instance: u32,
-    bytes: Vec<u8>,
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Part {
+    /// What it holds.
+    pub kind: u32,
+    /// Which of its kind.
+    pub instance: u32,
+    /// Its bytes, a multiple of four.
+    pub bytes: Vec<u8>,
 }
 
-fn words_to_bytes(words: &[u32]) -> Vec<u8> {
+/// The header and the sections of a file whose directory is sound, to be changed and laid out again.
+pub fn take_apart(file: &[u8]) -> ([u32; 32], Vec<Part>) {
+    let word = |at: usize| u32::from_le_bytes([file[at], file[at + 1], file[at + 2], file[at + 3]]);
+    let entry = |i: usize| {
+        let at = 128 + i * 16;
+        let (offset, length) = (word(at + 4) as usize, word(at + 8) as usize);
+        Part { kind: word(at) & 0xffff, instance: word(at) >> 16, bytes: file[offset..offset + length].to_vec() }
+    };
+    (std::array::from_fn(|i| word(i * 4)), (0..word(24) as usize).map(entry).collect())
+}
+
+/// Words in the byte order of the file.
+pub fn words_to_bytes(words: &[u32]) -> Vec<u8> {
     words.iter().flat_map(|word| word.to_le_bytes()).collect()
 }
 
@@ -132,8 +148,8 @@ fn header_words(content: u32, model: &MaterialModel, states: [u32; 3]) -> [u32; 
     header
 }
 
-/// Header, directory, sections and padding (3.1, 3.2).
-fn lay_out(mut header: [u32; 32], mut parts: Vec<Part>) -> Vec<u8> {
+/// Header, directory, sections and padding (3.1, 3.2), checksums included.
+pub fn lay_out(mut header: [u32; 32], mut parts: Vec<Part>) -> Vec<u8> {
     parts.sort_by_key(|part| (part.kind, part.instance));
     let mut bytes = vec![0u8; HEADER_LENGTH as usize + parts.len() * 16];
     for (i, part) in parts.iter().enumerate() {
@@ -188,7 +204,8 @@ fn metadata_part(metadata: &MetadataModel) -> Part {
     Part { kind: METADATA, instance: 0, bytes }
 }
 
-fn directions_part(instance: u32, points: &[[i32; 2]], t: &Triangulation) -> Part {
+/// A set of directions as a section (5.3).
+pub fn directions_part(instance: u32, points: &[[i32; 2]], t: &Triangulation) -> Part {
     let mut words = vec![points.len() as u32, t.triangles.len() as u32, t.hull.len() as u32, t.grid_size, t.candidates.len() as u32, 0, 0, 0];
     for &[x, y] in points {
         words.extend([x as u16 as u32 | (y as u16 as u32) << 16, cosine_of(x, y)]);

@@ -50,7 +50,7 @@ struct Material {
 
 @group(0) @binding(1) var<storage, read> materials: array<Material>;
 
-// Texels along an axis of `size` texels at `level`, halves rounded up (9.1-1).
+// Texels along an axis of `size` texels at `level`: its share of the size, rounded up (9.1-1).
 fn level_size(size: u32, level: u32) -> u32 {
     // 9.1-1: never zero, since sizes are at least one.
     return (size + ((1u << level) - 1u)) >> level;

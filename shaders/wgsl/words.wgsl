@@ -4,7 +4,7 @@
 
 @group(0) @binding(0) var<storage, read> files: array<u32>;
 
-// The word at `index`; zero outside the file, which no checked file asks for (1.2-1).
+// The word at `index`; zero outside the file (1.2-1). Only a window at the end of a stream reads there, and does not use it.
 fn word(index: u32) -> u32 {
     return files[index];
 }

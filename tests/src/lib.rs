@@ -1,1 +1,22 @@
-//! x
+//! What several tests share: where the data are, and loud words for what is skipped.
+
+use std::path::{Path, PathBuf};
+
+/// The excerpt in the repository.
+pub fn excerpt_folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("data/sparsebtf")
+}
+
+/// The full data, if `SELVEDGE_DATA` names them; says so loudly if not.
+pub fn full_data_folder(what_is_skipped: &str) -> Option<PathBuf> {
+    let folder = std::env::var_os("SELVEDGE_DATA").map(|data| PathBuf::from(data).join("sparsebtf")).filter(|folder| folder.is_dir());
+    if folder.is_none() {
+        eprintln!("SKIPPED: {what_is_skipped}: SELVEDGE_DATA DOES NOT NAME A FOLDER WITH sparsebtf/ IN IT");
+    }
+    folder
+}
+
+/// A number from the environment, for longer runs.
+pub fn setting(name: &str, default: usize) -> usize {
+    std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
+}

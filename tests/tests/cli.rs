@@ -1,0 +1,155 @@
+//! The program as a user meets it: exit codes, silence, whole files.
+
+use selvedge_tests::excerpt_folder;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// The program, built beside these tests.
+fn program() -> PathBuf {
+    let mut folder = std::env::current_exe().expect("a test has a path");
+    folder.pop();
+    if folder.ends_with("deps") {
+        folder.pop();
+    }
+    let path = folder.join(format!("selvedge{}", std::env::consts::EXE_SUFFIX));
+    assert!(path.exists(), "{} is built by `cargo build --workspace`", path.display());
+    path
+}
+
+fn run(arguments: &[&str]) -> Output {
+    Command::new(program()).args(arguments).output().expect("the program runs")
+}
+
+fn code(arguments: &[&str]) -> i32 {
+    run(arguments).status.code().expect("an exit code")
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().expect("UTF-8")
+}
+
+#[test]
+fn import_validate_info_decode() {
+    let folder = tempfile::tempdir().expect("folder");
+    let excerpt = excerpt_folder();
+    let (file, png, exr) = (folder.path().join("a.selv"), folder.path().join("a.png"), folder.path().join("a.exr"));
+    assert_eq!(code(&["import", text(&excerpt), "--material", "felt05", "-o", text(&file)]), 0);
+    let checked = run(&["validate", text(&file)]);
+    assert!(checked.status.success() && checked.stdout.is_empty() && checked.stderr.is_empty(), "silent when good");
+    let info: serde_json::Value = serde_json::from_slice(&run(&["info", "--json", text(&file)]).stdout).expect("JSON");
+    assert_eq!(info["size"], serde_json::json!([60, 60]));
+    assert_eq!(info["name"], "felt05");
+    assert_eq!(info["decode_digest"].as_str().map(str::len), Some(64));
+    assert_eq!(code(&["decode", text(&file), "-o", text(&png), "--light", "40,-30", "--exposure", "3"]), 0);
+    assert_eq!(code(&["decode", text(&file), "-o", text(&exr)]), 0);
+    assert_eq!(&std::fs::read(&png).expect("png")[1..4], b"PNG");
+    assert_eq!(&std::fs::read(&exr).expect("exr")[..4], [0x76, 0x2f, 0x31, 0x01]);
+}
+
+#[test]
+fn a_dictionary_of_its_own() {
+    let folder = tempfile::tempdir().expect("folder");
+    let (file, dictionary, whole) = (folder.path().join("a.selv"), folder.path().join("a.selvdict"), folder.path().join("b.selv"));
+    let excerpt = excerpt_folder();
+    assert_eq!(code(&["import", text(&excerpt), "--material", "carpet07", "-o", text(&file), "--dictionary", text(&dictionary)]), 0);
+    assert_eq!(code(&["import", text(&excerpt), "--material", "carpet07", "-o", text(&whole)]), 0);
+    assert_eq!(code(&["validate", text(&file)]), 1, "the dictionary is missing");
+    assert_eq!(code(&["validate", text(&file), "--dictionary", text(&dictionary)]), 0);
+    assert_eq!(code(&["validate", text(&dictionary)]), 0);
+    let digest = |arguments: &[&str]| serde_json::from_slice::<serde_json::Value>(&run(arguments).stdout).expect("JSON")["decode_digest"].clone();
+    let split = digest(&["info", "--json", text(&file), "--dictionary", text(&dictionary)]);
+    assert_eq!(split, digest(&["info", "--json", text(&whole)]));
+}
+
+#[test]
+fn exit_codes_tell_the_families_apart() {
+    let folder = tempfile::tempdir().expect("folder");
+    let good = excerpt_folder().join("../carpet07-excerpt.selv");
+    let bytes = std::fs::read(&good).expect("file");
+    let write = |name: &str, bytes: &[u8]| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).expect("write");
+        path
+    };
+    let mut newer = bytes.clone();
+    newer[8] = 2;
+    let mut damaged = bytes.clone();
+    damaged[5000] ^= 1;
+    assert_eq!(code(&["validate", text(&good)]), 0);
+    assert_eq!(code(&["frobnicate"]), 1);
+    assert_eq!(code(&["info", "nowhere.selv"]), 2);
+    assert_eq!(code(&["validate", text(&write("damaged", &damaged))]), 3);
+    assert_eq!(code(&["validate", text(&write("short", &bytes[..77]))]), 3);
+    assert_eq!(code(&["validate", text(&good), "--max-operations", "5"]), 4);
+    assert_eq!(code(&["validate", text(&write("newer", &newer))]), 5);
+    let found = run(&["validate", "--json", text(&folder.path().join("damaged"))]);
+    let report: serde_json::Value = serde_json::from_slice(&found.stdout).expect("JSON");
+    assert_eq!(report[0]["valid"], false);
+    assert_eq!(report[0]["findings"][0]["rule"], "3.2-7");
+}
+
+/// A failure leaves the old file as it was and nothing beside it.
+#[test]
+fn no_output_is_left_half_written() {
+    let folder = tempfile::tempdir().expect("folder");
+    let old = folder.path().join("old.selv");
+    std::fs::write(&old, b"precious").expect("write");
+    let broken = folder.path().join("broken");
+    std::fs::create_dir(&broken).expect("folder");
+    for entry in std::fs::read_dir(excerpt_folder()).expect("excerpt") {
+        let path = entry.expect("entry").path();
+        let bytes = std::fs::read(&path).expect("file");
+        let name = path.file_name().expect("name");
+        let keep = if name == "DictEnsOrth4DV.bin" { bytes.len() - 2 } else { bytes.len() };
+        std::fs::write(broken.join(name), &bytes[..keep]).expect("write");
+    }
+    assert_eq!(code(&["import", text(&broken), "--material", "carpet07", "-o", text(&old)]), 3);
+    assert_eq!(std::fs::read(&old).expect("still there"), b"precious");
+    assert_eq!(code(&["decode", text(&excerpt_folder().join("../carpet07-excerpt.selv")), "-o", text(&folder.path().join("picture.gif"))]), 1);
+    let names: Vec<_> = std::fs::read_dir(folder.path()).expect("folder").map(|e| e.expect("entry").file_name()).collect();
+    assert_eq!(names.len(), 2, "{names:?}");
+}
+
+/// Truncated and damaged foreign files: a typed error, never a panic (which would be code 101).
+#[test]
+fn damaged_foreign_files_are_refused() {
+    let folder = tempfile::tempdir().expect("folder");
+    let names = ["Coeffs_BTF_carpet07_1e-05_U.bin", "Coeffs_BTF_carpet07_1e-05_V.bin", "DictEnsOrth4DU.bin", "DictEnsOrth4DV.bin", "carpet07_mean_std.bin", "xyz_loc.bin"];
+    for name in names {
+        std::fs::copy(excerpt_folder().join(name), folder.path().join(name)).expect("copy");
+    }
+    let mut random = selvedge_tools::random::Random::new(4);
+    for name in names {
+        let path = folder.path().join(name);
+        let bytes = std::fs::read(&path).expect("file");
+        for cut in [0, 1, 7, bytes.len() / 2, bytes.len() - 1] {
+            std::fs::write(&path, &bytes[..cut]).expect("write");
+            let result = selvedge_tools::sparsebtf::read_material(folder.path(), "carpet07", None);
+            assert!(result.is_err(), "{name} cut to {cut}");
+        }
+        for _ in 0..12 {
+            let mut damaged = bytes.clone();
+            for _ in 0..4 {
+                let at = random.range(0, damaged.len() as i64 - 1) as usize;
+                damaged[at] = random.word() as u8;
+            }
+            std::fs::write(&path, &damaged).expect("write");
+            if let Ok(model) = selvedge_tools::sparsebtf::read_material(folder.path(), "carpet07", None).and_then(|m| m.to_model(8)) {
+                selvedge::open(&selvedge_tools::write::write_material(&model), &selvedge::Limits::NONE).expect("what is written is legal");
+            }
+        }
+        std::fs::write(&path, &bytes).expect("write");
+    }
+}
+
+#[test]
+fn the_kernel_is_translated() {
+    let folder = tempfile::tempdir().expect("folder");
+    assert_eq!(code(&["kernel", "--out", text(folder.path())]), 0);
+    let spirv = std::fs::read(folder.path().join("selvedge.spv")).expect("SPIR-V");
+    assert_eq!(spirv[..4], [0x03, 0x02, 0x23, 0x07]);
+    for (name, sign) in [("selvedge.wgsl", "@compute"), ("selvedge.metal", "kernel void filtered"), ("selvedge.hlsl", "numthreads"), ("selvedge_image.comp", "#version 310 es"), ("README.txt", "Bindings")] {
+        assert!(std::fs::read_to_string(folder.path().join(name)).expect(name).contains(sign), "{name}");
+    }
+    assert!(!std::fs::read_to_string(folder.path().join("selvedge_functions.wgsl")).expect("WGSL").contains("@compute"));
+}

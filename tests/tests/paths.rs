@@ -1,0 +1,182 @@
+//! Every path to a value gives the same bits: one texel at a time, whole images, batches; layers, levels.
+
+use proptest::prelude::*;
+use selvedge::batch::FilteredQuery;
+use selvedge::{Direction, Limits, Rgb, Selvedge};
+use selvedge_tools::example::example_model;
+use selvedge_tools::extreme::extreme_model;
+use selvedge_tools::random::Random;
+use selvedge_tools::write::{write_material, write_split};
+
+fn direction(random: &mut Random) -> Direction {
+    Direction { x_q14: random.range(-16_500, 16_500) as i32, y_q14: random.range(-16_500, 16_500) as i32, z_q15: random.range(-3, 32_800) as i32 }
+}
+
+fn batch_equals_plain(material: &Selvedge<'_>, random: &mut Random, count: usize) {
+    let queries: Vec<FilteredQuery> = (0..count)
+        .map(|_| FilteredQuery { u_q32: random.word(), v_q32: random.word(), light: direction(random), view: direction(random) })
+        .collect();
+    let mut scratch = vec![-1; material.batch_scratch_len(count)];
+    let mut out = vec![Rgb::default(); count];
+    material.sample_batch(&queries, &mut scratch, &mut out).expect("buffers fit");
+    for (query, rgb) in queries.iter().zip(&out) {
+        assert_eq!(material.filtered(query.u_q32, query.v_q32, query.light, query.view), *rgb, "{query:?}");
+    }
+    let short = scratch.len() - 1;
+    assert!(material.sample_batch(&queries, &mut scratch[..short], &mut out).is_err());
+}
+
+fn image_equals_plain(material: &Selvedge<'_>, random: &mut Random) {
+    let (light, view) = (direction(random), direction(random));
+    let (light_taps, view_taps) = (material.locate_light(light), material.locate_view(view));
+    let [width, height] = material.image_size(0);
+    let mut scratch = vec![-1; material.image_scratch_len()];
+    let mut image = vec![Rgb::default(); (width * height) as usize];
+    material.decode_image(0, light, view, &mut scratch, &mut image).expect("buffers fit");
+    for (i, rgb) in (0u32..).zip(&image) {
+        let values = selvedge::interpolation::texel_values(material.words(), material.material(), i % width, i / width, light_taps, view_taps);
+        assert_eq!(selvedge::interpolation::radiance(material.material(), values, light_taps), *rgb);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 96, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn extreme_files_decode_alike_on_every_path(seed in 0u64..1_000_000) {
+        let file = write_material(&extreme_model(seed));
+        let material = selvedge::open(&file, &Limits::NONE).expect("legal");
+        let mut random = Random::new(seed);
+        batch_equals_plain(&material, &mut random, 70);
+        image_equals_plain(&material, &mut random);
+    }
+
+    #[test]
+    fn an_external_dictionary_changes_nothing(seed in 0u64..1_000_000) {
+        let model = extreme_model(seed);
+        prop_assume!(model.channels.iter().any(|channel| channel.ensemble.is_some()));
+        let whole = write_material(&model);
+        let (file, dictionary) = write_split(&model);
+        let whole = selvedge::open(&whole, &Limits::NONE).expect("legal");
+        let split = selvedge::open_with(&file, Some(&dictionary), &Limits::NONE).expect("legal");
+        prop_assert_eq!(whole.decode_digest(), split.decode_digest());
+        let mut random = Random::new(seed);
+        batch_equals_plain(&split, &mut random, 20);
+        image_equals_plain(&split, &mut random);
+    }
+
+    /// A prefix of the layers is a file of its own that decodes as the whole one limited to it.
+    #[test]
+    fn layers_are_prefixes(seed in 0u64..1_000_000, layers in 1u32..8) {
+        let mut model = extreme_model(seed);
+        let layers = layers.min(model.layer_count);
+        let whole = write_material(&model);
+        model.layer_count = layers;
+        for ensemble in model.channels.iter_mut().filter_map(|channel| channel.ensemble.as_mut()) {
+            ensemble.coefficients.iter_mut().for_each(|level| level.truncate(layers as usize));
+        }
+        let trimmed = write_material(&model);
+        let whole = selvedge::open(&whole, &Limits::NONE).expect("legal").with_layers(layers);
+        let trimmed = selvedge::open(&trimmed, &Limits::NONE).expect("legal");
+        prop_assert_eq!(whole.decode_digest(), trimmed.decode_digest());
+    }
+
+    /// Weights of any direction sum to one and name directions that are there.
+    #[test]
+    fn weights_sum_to_one(seed in 0u64..1_000_000) {
+        let file = write_material(&extreme_model(seed));
+        let material = selvedge::open(&file, &Limits::NONE).expect("legal");
+        let mut random = Random::new(seed);
+        for _ in 0..200 {
+            let asked = direction(&mut random);
+            let taps = material.locate_light(asked);
+            prop_assert_eq!(taps.weight_a_q15 + taps.weight_b_q15 + taps.weight_c_q15, 32_768);
+            prop_assert!([taps.weight_a_q15, taps.weight_b_q15, taps.weight_c_q15].iter().all(|w| (0..=32_768).contains(w)));
+            prop_assert!([taps.a, taps.b, taps.c].iter().all(|&i| i < material.header().light_count));
+            prop_assert!((0..=32_768).contains(&taps.cosine_q15));
+        }
+    }
+}
+
+/// Written in the model's own terms: a sample direction is found, alone and whole.
+#[test]
+fn sample_directions_are_found() {
+    for seed in 0..120 {
+        let model = extreme_model(seed);
+        let file = write_material(&model);
+        let material = selvedge::open(&file, &Limits::NONE).expect("legal");
+        for (i, &[x_q14, y_q14]) in model.lights.iter().enumerate() {
+            let taps = material.locate_light(Direction { x_q14, y_q14, z_q15: 32_768 });
+            let weight: i32 =
+                [(taps.a, taps.weight_a_q15), (taps.b, taps.weight_b_q15), (taps.c, taps.weight_c_q15)].iter().filter(|t| t.0 as usize == i).map(|t| t.1).sum();
+            assert_eq!(weight, 32_768, "seed {seed} direction {i}");
+        }
+    }
+}
+
+/// Beyond the hull the place on it is the nearest, against a search in binary64.
+#[test]
+fn the_place_on_the_hull_is_the_nearest() {
+    for seed in 0..60 {
+        let model = extreme_model(seed);
+        let file = write_material(&model);
+        let material = selvedge::open(&file, &Limits::NONE).expect("legal");
+        let triangulation = selvedge_tools::triangulate::triangulate(&model.lights, None);
+        let mut random = Random::new(seed);
+        for _ in 0..200 {
+            let asked = direction(&mut random);
+            let p = [asked.x_q14.clamp(-16_384, 16_384) as f64, asked.y_q14.clamp(-16_384, 16_384) as f64];
+            let taps = material.locate_light(asked);
+            let at = |i: u32| model.lights[i as usize].map(|c| c as f64);
+            let blend: [f64; 2] = std::array::from_fn(|c| {
+                (at(taps.a)[c] * taps.weight_a_q15 as f64 + at(taps.b)[c] * taps.weight_b_q15 as f64 + at(taps.c)[c] * taps.weight_c_q15 as f64) / 32_768.0
+            });
+            let distance = |q: [f64; 2]| ((q[0] - p[0]).powi(2) + (q[1] - p[1]).powi(2)).sqrt();
+            let hull = &triangulation.hull;
+            let nearest = (0..hull.len()).map(|i| {
+                let (a, b) = (at(hull[i]), at(hull[(i + 1) % hull.len()]));
+                let d = [b[0] - a[0], b[1] - a[1]];
+                let t = (((p[0] - a[0]) * d[0] + (p[1] - a[1]) * d[1]) / (d[0] * d[0] + d[1] * d[1])).clamp(0.0, 1.0);
+                distance([a[0] + t * d[0], a[1] + t * d[1]])
+            });
+            let nearest = nearest.fold(if hull.is_empty() { distance(at(0)) } else { f64::MAX }, f64::min);
+            let inside = taps.weight_c_q15 > 0 || distance(blend) < 3.0;
+            assert!(inside || (distance(blend) - nearest).abs() < 3.0, "seed {seed} {asked:?}: {} {nearest}", distance(blend));
+        }
+    }
+}
+
+/// At a sample direction and a texel's centre a filtered sample is the point sample.
+#[test]
+fn filtered_samples_meet_point_samples() {
+    let file = write_material(&example_model());
+    let material = selvedge::open(&file, &Limits::NONE).expect("legal");
+    let model = example_model();
+    for light in 0..5u32 {
+        for view in 0..5u32 {
+            let at = |i: u32| {
+                let [x_q14, y_q14] = model.lights[i as usize];
+                Direction { x_q14, y_q14, z_q15: 32_768 }
+            };
+            let (l, v) = (material.locate_light(at(light)), material.locate_view(at(view)));
+            // The centre of texel (0, 1) of 3 x 2, where the fractions of u and v are exactly representable: v.
+            let values = material.filtered_values(((1u64 << 32) / 6 + 1) as u32, 0xc000_0000, l, v);
+            let point = material.point_values(0, 1, light, view);
+            assert!((values.c0 - point.c0).abs() <= 200 && values.c1 == point.c1, "{values:?} {point:?}");
+        }
+    }
+}
+
+/// Decoding needs no mutable state: many threads over one material.
+#[test]
+fn materials_are_shared_by_threads() {
+    fn is_shareable<T: Send + Sync>() {}
+    is_shareable::<Selvedge<'_>>();
+    let file = write_material(&extreme_model(8));
+    let material = selvedge::open(&file, &Limits::NONE).expect("legal");
+    let digests: Vec<_> = std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..3).map(|_| scope.spawn(|| material.decode_digest())).collect();
+        threads.into_iter().map(|thread| thread.join().expect("no panic")).collect()
+    });
+    assert!(digests.windows(2).all(|pair| pair[0] == pair[1]));
+}

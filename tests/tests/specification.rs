@@ -1,0 +1,93 @@
+//! Specification, conformance table, code and example agree.
+
+use selvedge::Rule;
+use selvedge_tools::example::{example_model, hex_dump};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+fn read(name: &str) -> String {
+    std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(name)).expect(name)
+}
+
+/// Rule numbers such as 5.4-2 at the begin of a line in bold.
+fn stated_rules() -> Vec<String> {
+    let spec = read("spec/selvedge-1.md");
+    let numbers = spec.lines().filter_map(|line| line.strip_prefix("**")?.split_once("**").map(|(number, _)| number.to_owned()));
+    numbers.filter(|n| n.contains('.') && n.contains('-') && n.chars().all(|c| c.is_ascii_digit() || c == '.' || c == '-')).collect()
+}
+
+#[test]
+fn every_rule_of_the_code_is_in_the_specification_once() {
+    let stated = stated_rules();
+    let unique: BTreeSet<_> = stated.iter().collect();
+    assert_eq!(unique.len(), stated.len(), "a number is used twice");
+    let missing: Vec<_> = Rule::ALL.iter().map(|rule| rule.id()).filter(|id| !unique.contains(&(*id).to_owned())).collect();
+    assert!(missing.is_empty(), "{missing:?}");
+    println!("{} rules, {} of them checked by open", stated.len(), Rule::ALL.len());
+}
+
+#[test]
+fn every_rule_that_a_comment_cites_is_in_the_specification() {
+    let stated: BTreeSet<_> = stated_rules().into_iter().collect();
+    let sources = ["decoder-core/src", "shaders/wgsl", "host-tools/src"];
+    let mut cited = 0;
+    for folder in sources {
+        for entry in std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(folder)).expect(folder) {
+            let path = entry.expect("entry").path();
+            let text = std::fs::read_to_string(&path).expect("source");
+            for comment in text.lines().filter_map(|line| line.split_once("//").map(|(_, comment)| comment)) {
+                for word in comment.split(|c: char| !(c.is_ascii_digit() || c == '.' || c == '-')) {
+                    let word = word.trim_end_matches(['.', '-']);
+                    let parts: Vec<&str> = word.split(['.', '-']).collect();
+                    let is_rule = word.contains('.') && word.contains('-') && parts.len() == 3 && word.find('.') < word.find('-') && parts.iter().all(|p| !p.is_empty());
+                    if is_rule {
+                        cited += 1;
+                        assert!(stated.contains(word), "{}: {word} is cited and not stated", path.display());
+                    }
+                }
+            }
+        }
+    }
+    assert!(cited > 200, "{cited}");
+}
+
+#[test]
+fn the_conformance_table_has_a_row_for_every_rule() {
+    let table = read("spec/conformance.md");
+    let rows: Vec<Vec<String>> = table
+        .lines()
+        .filter(|line| line.starts_with("| ") && line.as_bytes().get(2).is_some_and(u8::is_ascii_digit))
+        .map(|line| line.trim_matches('|').split('|').map(|cell| cell.trim().to_owned()).collect())
+        .collect();
+    let numbers: Vec<_> = rows.iter().map(|row| row[0].clone()).collect();
+    assert_eq!(numbers, stated_rules(), "rows in the order of the specification");
+    for row in &rows {
+        assert_eq!(row.len(), 5, "{row:?}");
+        if let Some(rule) = Rule::ALL.iter().find(|rule| rule.id() == row[0]) {
+            assert!(row[1].contains(&format!("`{}`", rule.name())), "{row:?} is {}", rule.name());
+        }
+    }
+}
+
+#[test]
+fn the_worked_example_is_what_the_writer_makes() {
+    let file = selvedge_tools::write::write_material(&example_model());
+    let spec = read("spec/selvedge-1.md");
+    let mut shown = BTreeSet::new();
+    let mut inside = false;
+    for line in spec.lines() {
+        if line.starts_with("```") {
+            inside = line == "```hex";
+            continue;
+        }
+        if inside && !line.trim().is_empty() {
+            let offset = usize::from_str_radix(line.split_whitespace().next().expect("an offset"), 16).expect("hex");
+            let bytes: Vec<u8> = line.split_whitespace().skip(1).map(|byte| u8::from_str_radix(byte, 16).expect("hex")).collect();
+            assert_eq!(&file[offset..offset + bytes.len()], bytes, "{line}\nis\n{}", hex_dump(&file[offset..offset + bytes.len()], offset));
+            shown.extend(offset..offset + bytes.len());
+        }
+    }
+    let opened = selvedge::open(&file, &selvedge::Limits::NONE).expect("legal");
+    assert!(spec.contains(&selvedge_tools::inspect::hex(&opened.decode_digest())), "the decode digest of the example is another");
+    assert!(shown.len() > 800, "only {} bytes of the example are shown", shown.len());
+}
