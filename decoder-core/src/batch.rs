@@ -108,7 +108,14 @@ impl Selvedge<'_> {
     pub fn batch_scratch_len(&self, count: usize) -> usize {
         let material = self.material();
         let blocks = block_count(material, material.width) as usize * block_count(material, material.height) as usize;
-        count * (QUERY_WORDS + 4 * (ITEM_WORDS + PART_WORDS)) + blocks + 1 + self.ready_len(material.light_start) + self.ready_len(material.view_start) + 6 * COLUMNS + 2 * COLUMNS * LANES + self.largest_record() * COEFFICIENT_WORDS
+        count * (QUERY_WORDS + 4 * (ITEM_WORDS + PART_WORDS))
+            + blocks
+            + 1
+            + self.ready_len(material.light_start)
+            + self.ready_len(material.view_start)
+            + 6 * COLUMNS
+            + 2 * COLUMNS * LANES
+            + self.largest_record() * COEFFICIENT_WORDS
     }
 
     /// Coefficients of the largest record of level 0.
@@ -289,7 +296,16 @@ impl Selvedge<'_> {
 
     /// Adds what a record gives to the textures of the queries that meet its block.
     #[inline(always)]
-    fn sample_record(&self, channel: Channel, number: usize, record: &Record, mark: i32, items: &[[i32; ITEM_WORDS]], textures: &mut [[i32; PART_WORDS]], workspace: &mut Workspace<'_>) {
+    fn sample_record(
+        &self,
+        channel: Channel,
+        number: usize,
+        record: &Record,
+        mark: i32,
+        items: &[[i32; ITEM_WORDS]],
+        textures: &mut [[i32; PART_WORDS]],
+        workspace: &mut Workspace<'_>,
+    ) {
         let words = self.words();
         let unpacked = self.unpack(channel, record, mark, workspace);
         let tables = [0, 1].map(|which| Table::new(words, channel.angular_start, record.dictionary, which));

@@ -127,7 +127,11 @@ pub(crate) fn check_directions(check: &mut Check<'_, '_>, section: Section, coun
     let (stated, triangle_count, hull_count, grid_size, candidate_count) = (field(0), field(1), field(2), field(3), field(4));
     let counts = [
         (0, stated, stated == count),
-        (4, triangle_count, triangle_count <= 2048 && if triangle_count > 0 { hull_count >= 3 && triangle_count + 2 + hull_count.min(4096) == 2 * count } else { true }),
+        (
+            4,
+            triangle_count,
+            triangle_count <= 2048 && if triangle_count > 0 { hull_count >= 3 && triangle_count + 2 + hull_count.min(4096) == 2 * count } else { true },
+        ),
         (8, hull_count, if triangle_count > 0 { hull_count <= count } else { hull_count == 2 * (count - 1) }),
         (12, grid_size, (1..=64).contains(&grid_size)),
         (16, candidate_count, candidate_count <= 1 << 20),

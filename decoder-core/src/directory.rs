@@ -80,7 +80,13 @@ fn called_for(header: &Header, external: bool, kind: u32, instance: u32) -> Call
         EXTERNAL => when(instance == 0, Call::Allowed),
         DIRECTIONS => match instance {
             0 => Call::Required,
-            1 => if header.light_count == header.view_count { Call::Allowed } else { Call::Required },
+            1 => {
+                if header.light_count == header.view_count {
+                    Call::Allowed
+                } else {
+                    Call::Required
+                }
+            }
             _ => Call::Foreign,
         },
         MEANS => when(state >= 1, Call::Required),

@@ -1,10 +1,12 @@
 //! Checks of the sparse ensemble's sections (chapter 10).
 
 use crate::check::{Check, Section};
+use crate::cost::record_operations;
+use crate::directory::{ANGULAR, ATOMS, COEFFICIENTS, SPATIAL, find_section};
 use crate::ensemble::{LOW_BITS_BITS, SHIFT_BIAS, SHIFT_BITS};
 use crate::error::Rule;
 use crate::header::Header;
-use crate::material::level_size;
+use crate::material::{Material, level_size};
 use crate::stream::{Ones, window};
 use crate::words::{Words, word};
 
@@ -18,6 +20,95 @@ pub const ATOM_LIMIT: u32 = 65_536;
 pub const SUM_LIMIT: u32 = 65_535;
 /// Most low bits of a position (10.4-7).
 pub const LOW_BITS_LIMIT: u32 = 12;
+
+/// Walks chapter 10 of a dictionary.
+pub(crate) fn check_method_dictionary(check: &mut Check<'_, '_>, header: &Header) -> Option<()> {
+    for c in 0..3 {
+        if let Some(section) = find_section(check, header, ANGULAR, c) {
+            let angular = check_factors(check, section, header.light_count, header.view_count, ANGULAR_COLUMN_LIMIT)?;
+            if let Some(section) = find_section(check, header, SPATIAL, c) {
+                let spatial = check_factors(check, section, header.edge, header.edge, header.edge)?;
+                check.ensure(spatial.count == angular.count, Rule::SpatialCounts, section.offset, spatial.count);
+            }
+        }
+    }
+    Some(())
+}
+
+/// Walks chapter 10 of a material, but for its statement of cost; gives the largest operations of the records that one position touches.
+pub(crate) fn check_method(check: &mut Check<'_, '_>, header: &Header, external: Option<&Header>, material: &mut Material) -> Option<u64> {
+    let mut atoms = [None::<Section>; 3];
+    let mut spatial_of = [None::<Factors>; 3];
+    let mut angular_of = [None::<Factors>; 3];
+    for (c, slot) in (0u32..).zip(angular_of.iter_mut()).filter(|(c, _)| header.is_full(*c)) {
+        *slot = Some(match external {
+            // Checked already, with its own file.
+            Some(other) => check.in_dictionary(|inner| {
+                let start = inner.section_start(find_section(inner, other, ANGULAR, c)?);
+                Some(Factors { start, count: word(inner.words, start) })
+            })?,
+            None => {
+                let section = find_section(check, header, ANGULAR, c)?;
+                check_factors(check, section, header.light_count, header.view_count, ANGULAR_COLUMN_LIMIT)?
+            }
+        });
+    }
+    for (c, slot) in (0u32..).zip(spatial_of.iter_mut()).filter(|(c, _)| header.is_full(*c)) {
+        *slot = Some(match (find_section(check, header, SPATIAL, c), external) {
+            (Some(section), _) => check_factors(check, section, header.edge, header.edge, header.edge)?,
+            (None, Some(other)) => check.in_dictionary(|inner| {
+                let start = inner.section_start(find_section(inner, other, SPATIAL, c)?);
+                Some(Factors { start, count: word(inner.words, start) })
+            })?,
+            (None, None) => return None,
+        });
+    }
+    for (c, ((angular, spatial), slot)) in (0u32..).zip(angular_of.iter().zip(&spatial_of).zip(atoms.iter_mut())) {
+        let (Some(angular), Some(spatial)) = (*angular, *spatial) else { continue };
+        let section = find_section(check, header, ATOMS, c)?;
+        let spatial_at = find_section(check, header, SPATIAL, c).unwrap_or(section).offset;
+        if !check.ensure(spatial.count == angular.count, Rule::SpatialCounts, spatial_at, spatial.count) {
+            return None;
+        }
+        if !check_atoms(check, section, angular, spatial) {
+            return None;
+        }
+        *slot = Some(section);
+        if let Some(channel) = material.channels.get_mut(c as usize) {
+            channel.angular_start = angular.start;
+            channel.spatial_start = spatial.start;
+            channel.atoms_start = check.section_start(section);
+        }
+    }
+    let first = find_in_coefficients(check, header);
+    material.coefficient_entry = first.map_or(0, |section| section.entry >> 2);
+    let mut records = 0;
+    let mut sound = true;
+    for level in 0..header.level_count {
+        let mut at_level = 0u64;
+        for layer in 0..header.layer_count {
+            for (c, atoms) in (0u32..).zip(atoms) {
+                let Some(atoms) = atoms else { continue };
+                let section = find_section(check, header, COEFFICIENTS, level << 8 | layer << 4 | c)?;
+                match check_coefficients(check, section, header, level, atoms) {
+                    Some(largest) => at_level += record_operations(largest, header.edge),
+                    None => sound = false,
+                }
+                if check.stopped {
+                    return None;
+                }
+            }
+        }
+        records = records.max(at_level);
+    }
+    sound.then_some(records)
+}
+
+/// The first section of coefficients.
+fn find_in_coefficients(check: &Check<'_, '_>, header: &Header) -> Option<Section> {
+    let c = (0..3).find(|&c| header.is_full(c))?;
+    find_section(check, header, COEFFICIENTS, c)
+}
 
 /// A section of factors that was checked, in either file.
 #[derive(Clone, Copy)]

@@ -47,7 +47,15 @@ impl Selvedge<'_> {
     ///
     /// # Errors
     /// If `out` has fewer than width x height elements or `scratch` fewer than [`Selvedge::image_scratch_len`].
-    pub fn decode_channel(&self, channel: usize, level: u32, light: Direction, view: Direction, scratch: &mut [i32], out: &mut [i32]) -> Result<(), BufferTooSmall> {
+    pub fn decode_channel(
+        &self,
+        channel: usize,
+        level: u32,
+        light: Direction,
+        view: Direction,
+        scratch: &mut [i32],
+        out: &mut [i32],
+    ) -> Result<(), BufferTooSmall> {
         let texels = self.image_buffers(level, scratch.len(), out.len())?;
         let (light, view) = (self.locate_light(light), self.locate_view(view));
         let out = out.get_mut(..texels).unwrap_or(&mut []);

@@ -5,9 +5,12 @@
 
 use crate::colour::{Rgb, Values, colour};
 use crate::direction::{Direction, Taps, locate, single_tap};
+#[cfg(feature = "sparse-ensemble")]
 use crate::ensemble::texture_q20;
 use crate::fixed::{clamp_magnitude, multiply_q15, round_shift};
 use crate::material::{CHANNEL_FULL, CHANNEL_MISSING, Channel, Material, level_size};
+#[cfg(not(feature = "sparse-ensemble"))]
+use crate::no_method::texture_q20;
 use crate::position::{Axis, axis_at_position, axis_at_texel};
 use crate::words::{Words, packed_i16, word};
 

@@ -35,8 +35,8 @@
 
 #![no_std]
 #![forbid(unsafe_code)]
-// Twins spell out every parameter, in the order of the kernel.
-#![allow(clippy::too_many_arguments)]
+#![allow(clippy::too_many_arguments, reason = "twins spell out every parameter, in the order of the kernel")]
+#![allow(clippy::manual_clamp, clippy::manual_range_contains, reason = "twins are written in the dialect that WGSL can say")]
 
 #[cfg(test)]
 extern crate std;
@@ -50,7 +50,9 @@ mod crc32;
 pub mod direction;
 pub mod direction_set;
 pub mod directory;
+#[cfg(feature = "sparse-ensemble")]
 pub mod ensemble;
+#[cfg(feature = "sparse-ensemble")]
 pub mod ensemble_set;
 pub mod error;
 pub mod fixed;
@@ -61,6 +63,8 @@ pub mod interpolation;
 pub mod limits;
 pub mod material;
 pub mod metadata;
+#[cfg(not(feature = "sparse-ensemble"))]
+mod no_method;
 mod open;
 pub mod pair_table;
 pub mod position;
@@ -68,6 +72,7 @@ pub mod position;
 mod records;
 pub mod result;
 mod sha256;
+#[cfg(feature = "sparse-ensemble")]
 mod stream;
 pub mod words;
 

@@ -2,19 +2,20 @@
 
 use crate::check::{Check, Section};
 use crate::colour::{Rgb, Values};
-use crate::cost::{Shape, filtered_operations, record_operations};
+use crate::cost::{Shape, filtered_operations};
 use crate::direction::{Direction, Taps};
 use crate::direction_set::{check_directions, largest_candidates};
-use crate::directory::{
-    ANGULAR, ATOMS, COEFFICIENTS, DIRECTIONS, EXTERNAL, MEANS, METADATA, SCALES, SPATIAL, check_directory, find_in, find_section, read_entry,
-};
-use crate::ensemble_set::{ANGULAR_COLUMN_LIMIT, Factors, check_atoms, check_coefficients, check_factors};
+use crate::directory::{DIRECTIONS, EXTERNAL, MEANS, METADATA, SCALES, SPATIAL, check_directory, find_in, find_section, read_entry};
+#[cfg(feature = "sparse-ensemble")]
+use crate::ensemble_set::{check_method, check_method_dictionary};
 use crate::error::{Finding, First, Part, Rule, Sink};
 use crate::header::{CONTENT_DICTIONARY, CONTENT_MATERIAL, Header, check_header};
 use crate::interpolation::{filtered_values, locate_light, locate_view, point_values, radiance, trilinear_values};
 use crate::limits::Limits;
 use crate::material::{CHANNEL_FULL, Channel, Material, TRANSFER_LOG2};
 use crate::metadata::{Metadata, check_external, check_metadata, read_metadata};
+#[cfg(not(feature = "sparse-ensemble"))]
+use crate::no_method::{check_method, check_method_dictionary};
 use crate::pair_table::check_pair_table;
 use crate::sha256::sha256;
 use crate::words::{Words, word};
@@ -82,15 +83,7 @@ fn walk_dictionary(check: &mut Check<'_, '_>, limits: &Limits) -> Option<Header>
     }
     let section = find_section(check, &header, METADATA, 0)?;
     check_metadata(check, section);
-    for c in 0..3 {
-        if let Some(section) = find_section(check, &header, ANGULAR, c) {
-            let angular = check_factors(check, section, header.light_count, header.view_count, ANGULAR_COLUMN_LIMIT)?;
-            if let Some(section) = find_section(check, &header, SPATIAL, c) {
-                let spatial = check_factors(check, section, header.edge, header.edge, header.edge)?;
-                check.ensure(spatial.count == angular.count, Rule::SpatialCounts, section.offset, spatial.count);
-            }
-        }
-    }
+    check_method_dictionary(check, &header)?;
     check.clean.then_some(header)
 }
 
@@ -131,7 +124,7 @@ fn check_material<'a>(bytes: &'a [u8], dictionary: Option<&'a [u8]>, limits: &Li
             }
         }
     }
-    let records = walk_ensemble(check, &header, external.as_ref(), &mut material)?;
+    let records = check_method(check, &header, external.as_ref(), &mut material)?;
     if !sound || check.stopped {
         return None;
     }
@@ -200,81 +193,6 @@ fn describe(header: &Header) -> Material {
         channels,
         ..Material::default()
     }
-}
-
-/// Walks chapter 10; gives the largest operations of the records that one position touches.
-fn walk_ensemble(check: &mut Check<'_, '_>, header: &Header, external: Option<&Header>, material: &mut Material) -> Option<u64> {
-    let mut atoms = [None::<Section>; 3];
-    let mut spatial_of = [None::<Factors>; 3];
-    let mut angular_of = [None::<Factors>; 3];
-    for (c, slot) in (0u32..).zip(angular_of.iter_mut()).filter(|(c, _)| header.is_full(*c)) {
-        *slot = Some(match external {
-            // Checked already, with its own file.
-            Some(other) => check.in_dictionary(|inner| {
-                let start = inner.section_start(find_section(inner, other, ANGULAR, c)?);
-                Some(Factors { start, count: word(inner.words, start) })
-            })?,
-            None => {
-                let section = find_section(check, header, ANGULAR, c)?;
-                check_factors(check, section, header.light_count, header.view_count, ANGULAR_COLUMN_LIMIT)?
-            }
-        });
-    }
-    for (c, slot) in (0u32..).zip(spatial_of.iter_mut()).filter(|(c, _)| header.is_full(*c)) {
-        *slot = Some(match (find_section(check, header, SPATIAL, c), external) {
-            (Some(section), _) => check_factors(check, section, header.edge, header.edge, header.edge)?,
-            (None, Some(other)) => check.in_dictionary(|inner| {
-                let start = inner.section_start(find_section(inner, other, SPATIAL, c)?);
-                Some(Factors { start, count: word(inner.words, start) })
-            })?,
-            (None, None) => return None,
-        });
-    }
-    for (c, ((angular, spatial), slot)) in (0u32..).zip(angular_of.iter().zip(&spatial_of).zip(atoms.iter_mut())) {
-        let (Some(angular), Some(spatial)) = (*angular, *spatial) else { continue };
-        let section = find_section(check, header, ATOMS, c)?;
-        let spatial_at = find_section(check, header, SPATIAL, c).unwrap_or(section).offset;
-        if !check.ensure(spatial.count == angular.count, Rule::SpatialCounts, spatial_at, spatial.count) {
-            return None;
-        }
-        if !check_atoms(check, section, angular, spatial) {
-            return None;
-        }
-        *slot = Some(section);
-        if let Some(channel) = material.channels.get_mut(c as usize) {
-            channel.angular_start = angular.start;
-            channel.spatial_start = spatial.start;
-            channel.atoms_start = check.section_start(section);
-        }
-    }
-    let first = find_in_coefficients(check, header);
-    material.coefficient_entry = first.map_or(0, |section| section.entry >> 2);
-    let mut records = 0;
-    let mut sound = true;
-    for level in 0..header.level_count {
-        let mut at_level = 0u64;
-        for layer in 0..header.layer_count {
-            for (c, atoms) in (0u32..).zip(atoms) {
-                let Some(atoms) = atoms else { continue };
-                let section = find_section(check, header, COEFFICIENTS, level << 8 | layer << 4 | c)?;
-                match check_coefficients(check, section, header, level, atoms) {
-                    Some(largest) => at_level += record_operations(largest, header.edge),
-                    None => sound = false,
-                }
-                if check.stopped {
-                    return None;
-                }
-            }
-        }
-        records = records.max(at_level);
-    }
-    sound.then_some(records)
-}
-
-/// The first section of coefficients.
-fn find_in_coefficients(check: &Check<'_, '_>, header: &Header) -> Option<Section> {
-    let c = (0..3).find(|&c| header.is_full(c))?;
-    find_section(check, header, COEFFICIENTS, c)
 }
 
 impl<'a> Selvedge<'a> {

@@ -124,9 +124,7 @@ mod tests {
 
     #[test]
     fn fractions_of_binary32_wrap() {
-        for (value, want) in
-            [(0.25f32, 1u32 << 30), (1.25, 1 << 30), (-0.25, 3 << 30), (-7.75, 1 << 30), (0.0, 0), (1e30, 0), (f32::NAN, 0), (1e-30, 0)]
-        {
+        for (value, want) in [(0.25f32, 1u32 << 30), (1.25, 1 << 30), (-0.25, 3 << 30), (-7.75, 1 << 30), (0.0, 0), (1e30, 0), (f32::NAN, 0), (1e-30, 0)] {
             assert_eq!(fraction_from_binary32(value.to_bits()), want, "{value}");
         }
         let mut state = 1u32;

@@ -179,13 +179,10 @@ const FLAT: &str = "
 fn on_gpu(device: &wgpu::Device, queue: &wgpu::Queue, case: &Case, queries: &[Query], body: &str) -> (f64, Vec<i32>) {
     let source = if body.contains("@compute") { format!("{COMMON}{body}") } else { format!("{COMMON}{}", GROUPED.replace("TERM", body)) };
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: None, source: wgpu::ShaderSource::Wgsl(source.into()) });
-    let descriptor = wgpu::ComputePipelineDescriptor { label: None, layout: None, module: &module, entry_point: None, compilation_options: Default::default(), cache: None };
+    let descriptor =
+        wgpu::ComputePipelineDescriptor { label: None, layout: None, module: &module, entry_point: None, compilation_options: Default::default(), cache: None };
     let pipeline = device.create_compute_pipeline(&descriptor);
-    let terms: Vec<i32> = case
-        .terms
-        .iter()
-        .flat_map(|t| [(t.x | t.y << 5 | t.light << 10 | t.view << 15) as i32, t.short, t.long, t.shift as i32])
-        .collect();
+    let terms: Vec<i32> = case.terms.iter().flat_map(|t| [(t.x | t.y << 5 | t.light << 10 | t.view << 15) as i32, t.short, t.long, t.shift as i32]).collect();
     let starts: Vec<usize> = case.tables.iter().scan(0, |at, t| Some(std::mem::replace(at, *at + t.len()))).collect();
     let words: Vec<u32> = queries.iter().flat_map(|q| (0..4).map(|i| (starts[i] + q[i] * COLUMNS) as u32)).collect();
     let tables: Vec<i32> = case.tables.concat();
@@ -234,14 +231,16 @@ fn main() {
     let adapter = pollster::block_on(instance.request_adapter(&Default::default())).ok();
     let gpu = adapter.as_ref().map(|a| {
         println!("adapter: {}", a.get_info().name);
-        pollster::block_on(a.request_device(&wgpu::DeviceDescriptor { required_limits: wgpu::Limits::downlevel_defaults(), ..Default::default() })).expect("device")
+        pollster::block_on(a.request_device(&wgpu::DeviceDescriptor { required_limits: wgpu::Limits::downlevel_defaults(), ..Default::default() }))
+            .expect("device")
     });
     println!("target features: avx2 {}", cfg!(target_feature = "avx2"));
     for (count, atoms) in [(64, 6), (256, 59)] {
         let case = case(count, atoms);
         let mut random = Random::new(1);
-        let queries: Vec<Query> =
-            (0..1 << 16).map(|_| [random.range(0, 150) as usize, random.range(0, 150) as usize, random.range(0, 9) as usize, random.range(0, 9) as usize]).collect();
+        let queries: Vec<Query> = (0..1 << 16)
+            .map(|_| [random.range(0, 150) as usize, random.range(0, 150) as usize, random.range(0, 9) as usize, random.range(0, 9) as usize])
+            .collect();
         let blended: Vec<Blended> = queries[..512].chunks(LANES).map(|q| blend(&case, q)).collect();
         for (name, order, kernel) in ORDERS {
             // Answers first: signal to noise against binary64, from units of 2^-15.

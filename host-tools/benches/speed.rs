@@ -68,24 +68,33 @@ fn main() {
         assert_eq!(plain(query), *rgb, "the batch is not the plain path");
     }
     let count = queries.len() as f64;
-    println!("filtered, 2 x 64 coefficients, one by one     {}", rate(count / 8.0, || {
-        for query in &queries[..queries.len() / 8] {
-            black_box(plain(query));
-        }
-    }));
-    for batch in [1 << 12, 1 << 14, 1 << 15, 1 << 16] {
-        println!("filtered, 2 x 64 coefficients, batches of {batch:5} {}", rate(count, || {
-            for (queries, out) in queries.chunks(batch).zip(out.chunks_mut(batch)) {
-                material.sample_batch(queries, &mut scratch, out).expect("buffers fit");
+    println!(
+        "filtered, 2 x 64 coefficients, one by one     {}",
+        rate(count / 8.0, || {
+            for query in &queries[..queries.len() / 8] {
+                black_box(plain(query));
             }
-            black_box(&out);
-        }));
+        })
+    );
+    for batch in [1 << 12, 1 << 14, 1 << 15, 1 << 16] {
+        println!(
+            "filtered, 2 x 64 coefficients, batches of {batch:5} {}",
+            rate(count, || {
+                for (queries, out) in queries.chunks(batch).zip(out.chunks_mut(batch)) {
+                    material.sample_batch(queries, &mut scratch, out).expect("buffers fit");
+                }
+                black_box(&out);
+            })
+        );
     }
-    println!("two directions located                         {}", rate(count, || {
-        for query in &queries {
-            black_box((material.locate_light(query.light), material.locate_view(query.view)));
-        }
-    }));
+    println!(
+        "two directions located                         {}",
+        rate(count, || {
+            for query in &queries {
+                black_box((material.locate_light(query.light), material.locate_view(query.view)));
+            }
+        })
+    );
 
     let [width, height] = material.image_size(0);
     let texels = (width * height) as usize;
@@ -101,17 +110,23 @@ fn main() {
             assert_eq!([whole.c0, whole.c1, whole.c2][channel], *value, "the image is not the plain path");
         }
     }
-    println!("whole image, channel texels (two channels)     {}", rate(2.0 * texels as f64, || {
-        for channel in [1, 2] {
-            material.decode_channel(channel, 0, light, view, &mut scratch, &mut values).expect("buffers fit");
-        }
-        black_box(&values);
-    }));
+    println!(
+        "whole image, channel texels (two channels)     {}",
+        rate(2.0 * texels as f64, || {
+            for channel in [1, 2] {
+                material.decode_channel(channel, 0, light, view, &mut scratch, &mut values).expect("buffers fit");
+            }
+            black_box(&values);
+        })
+    );
     let mut image = vec![Rgb::default(); texels];
-    println!("whole image, RGB texels                        {}", rate(texels as f64, || {
-        material.decode_image(0, light, view, &mut scratch, &mut image).expect("buffers fit");
-        black_box(&image);
-    }));
+    println!(
+        "whole image, RGB texels                        {}",
+        rate(texels as f64, || {
+            material.decode_image(0, light, view, &mut scratch, &mut image).expect("buffers fit");
+            black_box(&image);
+        })
+    );
 
     // A file of about 5 MB: the same records over a taller image.
     let mut model = authors.to_model(10).expect("model");

@@ -135,7 +135,8 @@ fn channel_tiles(authors: &AuthorsMaterial, material: &Selvedge<'_>, channel: us
         .collect();
     let (low, high) = reference.iter().fold((f64::MAX, f64::MIN), |(low, high), &v| (low.min(v), high.max(v)));
     let grey = |values: &[f64]| Picture::from_fn(width, height, |x, y| [(((values[y * width + x] - low) / (high - low)).clamp(0.0, 1.0).powf(2.2)) as f32; 3]);
-    let error = Picture::from_fn(width, height, |x, y| false_colour(((decoded[y * width + x] - reference[y * width + x]).abs() / ((high - low) * 0.02)) as f32));
+    let error =
+        Picture::from_fn(width, height, |x, y| false_colour(((decoded[y * width + x] - reference[y * width + x]).abs() / ((high - low) * 0.02)) as f32));
     Picture::beside(&[grey(&decoded).enlarged(4), grey(&reference).enlarged(4), error.enlarged(4)], 8)
 }
 
@@ -151,9 +152,7 @@ fn compare_with_gpu(materials: &[Selvedge<'_>], say: &mut dyn FnMut(String)) -> 
     let (mut words, mut differing) = (0usize, 0usize);
     let mut compare = |gpu: &[Answer], cpu: &[Answer]| {
         words += cpu.len() * 6;
-        let differs = |(a, b): (&Answer, &Answer)| {
-            (0..3).filter(|&i| a.rgb[i] != b.rgb[i]).count() + (0..3).filter(|&i| a.values[i] != b.values[i]).count()
-        };
+        let differs = |(a, b): (&Answer, &Answer)| (0..3).filter(|&i| a.rgb[i] != b.rgb[i]).count() + (0..3).filter(|&i| a.values[i] != b.values[i]).count();
         differing += gpu.iter().zip(cpu).map(differs).sum::<usize>() + gpu.len().abs_diff(cpu.len()) * 6;
     };
     for entry in ["texel", "filtered", "trilinear", "floats"] {
@@ -168,9 +167,8 @@ fn compare_with_gpu(materials: &[Selvedge<'_>], say: &mut dyn FnMut(String)) -> 
         let on_gpu = gpu.image(&loaded, query, size)?;
         let picture = decode_picture(material, 0, light, view)?;
         let taps = (material.locate_light(light), material.locate_view(view));
-        let values = |i: usize| {
-            selvedge::interpolation::texel_values(material.words(), material.material(), i as u32 % size[0], i as u32 / size[0], taps.0, taps.1)
-        };
+        let values =
+            |i: usize| selvedge::interpolation::texel_values(material.words(), material.material(), i as u32 % size[0], i as u32 / size[0], taps.0, taps.1);
         let answer = |(i, rgb): (usize, &[f32; 3])| Answer { rgb: rgb.map(f32::to_bits), values: [values(i).c0, values(i).c1, values(i).c2] };
         let cpu: Vec<Answer> = picture.pixels.iter().enumerate().map(answer).collect();
         compare(&on_gpu, &cpu);
@@ -229,7 +227,14 @@ pub fn run(out: &Path, say: &mut dyn FnMut(String)) -> Result<()> {
         let bytes = write::write_material(&material.to_model(VALUE_BITS)?);
         let path = out.join(format!("{name}.selv"));
         files::write(&path, &bytes)?;
-        say(format!("imported {name}: {} bytes, {} x {} texels, {} light x {} view directions", bytes.len(), material.blocks[0] * 10, material.blocks[1] * 10, material.rows[2], material.rows[3]));
+        say(format!(
+            "imported {name}: {} bytes, {} x {} texels, {} light x {} view directions",
+            bytes.len(),
+            material.blocks[0] * 10,
+            material.blocks[1] * 10,
+            material.rows[2],
+            material.rows[3]
+        ));
         authors.push(material);
         written.push((path, bytes));
     }
@@ -248,8 +253,15 @@ pub fn run(out: &Path, say: &mut dyn FnMut(String)) -> Result<()> {
     for (authors, material) in authors.iter().zip(&materials) {
         for (channel, letter) in [(1, "U"), (2, "V")] {
             let error = channel_error(authors, material, channel, &pairs);
-            say(format!("{} {letter}: texture part {:.1} dB against the authors' values, largest error {:.1e}", authors.name, error.texture_snr_db, error.largest));
-            let _ = writeln!(rows, "<tr><td>{}</td><td>{letter}</td><td>{:.1}</td><td>{:.1}</td><td>{:.1e}</td></tr>", authors.name, error.texture_snr_db, error.total_snr_db, error.largest);
+            say(format!(
+                "{} {letter}: texture part {:.1} dB against the authors' values, largest error {:.1e}",
+                authors.name, error.texture_snr_db, error.largest
+            ));
+            let _ = writeln!(
+                rows,
+                "<tr><td>{}</td><td>{letter}</td><td>{:.1}</td><td>{:.1}</td><td>{:.1e}</td></tr>",
+                authors.name, error.texture_snr_db, error.total_snr_db, error.largest
+            );
             if error.texture_snr_db < 40.0 {
                 return Err(ToolError::Mismatch(format!("{} {letter}: only {:.1} dB", authors.name, error.texture_snr_db)));
             }

@@ -44,7 +44,11 @@ pub fn example_model() -> MaterialModel {
         lights: vec![[0, 0], [8000, 0], [0, 8000], [-8000, 0], [0, -8000]],
         views: None,
         channels: [
-            ChannelModel { mean: Some(table(-3 << 20, 4, 30)), scale: Some(PairTableModel { base_q20: 0, shift: 1, entries: vec![16384; 25] }), ensemble: Some(ensemble) },
+            ChannelModel {
+                mean: Some(table(-3 << 20, 4, 30)),
+                scale: Some(PairTableModel { base_q20: 0, shift: 1, entries: vec![16384; 25] }),
+                ensemble: Some(ensemble),
+            },
             ChannelModel { mean: Some(table(0, 0, 5)), ..ChannelModel::default() },
             ChannelModel::default(),
         ],

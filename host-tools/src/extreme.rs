@@ -137,9 +137,7 @@ fn extreme_ensemble(r: &mut Random, edge: u32, lights: usize, views: usize, bloc
     let coefficients = blocks
         .iter()
         .map(|&count| {
-            (0..layers)
-                .map(|_| CoefficientsModel { value_bits, records: (0..count).map(|_| extreme_record(r, &atoms, value_bits)).collect() })
-                .collect()
+            (0..layers).map(|_| CoefficientsModel { value_bits, records: (0..count).map(|_| extreme_record(r, &atoms, value_bits)).collect() }).collect()
         })
         .collect();
     EnsembleModel { dictionaries, atoms, coefficients }

@@ -3,6 +3,8 @@
 use crate::error::{Result, ToolError};
 use selvedge::{Direction, Rgb, Selvedge, Values};
 use selvedge_shaders::{Method, Request, assemble};
+use std::collections::BTreeMap;
+use std::sync::Mutex;
 use wgpu::util::DeviceExt as _;
 
 /// A question to the kernel; what the words mean depends on the entry point (see `entries.wgsl`).
@@ -88,6 +90,7 @@ pub struct Gpu {
     module: wgpu::ShaderModule,
     layout: wgpu::BindGroupLayout,
     pipeline_layout: wgpu::PipelineLayout,
+    pipelines: Mutex<BTreeMap<String, wgpu::ComputePipeline>>,
     /// Name, backend and kind of the adapter.
     pub description: String,
 }
@@ -126,7 +129,11 @@ impl Gpu {
             .map(|binding| wgpu::BindGroupLayoutEntry {
                 binding,
                 visibility: wgpu::ShaderStages::COMPUTE,
-                ty: wgpu::BindingType::Buffer { ty: wgpu::BufferBindingType::Storage { read_only: binding < 3 }, has_dynamic_offset: false, min_binding_size: None },
+                ty: wgpu::BindingType::Buffer {
+                    ty: wgpu::BufferBindingType::Storage { read_only: binding < 3 },
+                    has_dynamic_offset: false,
+                    min_binding_size: None,
+                },
                 count: None,
             })
             .collect();
@@ -134,7 +141,8 @@ impl Gpu {
         let pipeline_layout =
             device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor { label: None, bind_group_layouts: &[Some(&layout)], immediate_size: 0 });
         let description = format!("{} ({:?}, {:?})", info.name, info.backend, info.device_type);
-        Ok(Some(Gpu { device, queue, module, layout, pipeline_layout, description }))
+        let pipelines = Mutex::default();
+        Ok(Some(Gpu { device, queue, module, layout, pipeline_layout, pipelines, description }))
     }
 
     /// Puts materials into one buffer, each with its dictionary behind it.
@@ -157,15 +165,24 @@ impl Gpu {
         Loaded { files: buffer("files", &files), materials: buffer("materials", bytemuck::cast_slice(&records)) }
     }
 
+    /// The pipeline of an entry point, compiled when it is first asked for.
+    fn pipeline(&self, entry: &str) -> wgpu::ComputePipeline {
+        let mut pipelines = self.pipelines.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let compile = || {
+            self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some(entry),
+                layout: Some(&self.pipeline_layout),
+                module: &self.module,
+                entry_point: Some(entry),
+                compilation_options: Default::default(),
+                cache: None,
+            })
+        };
+        pipelines.entry(entry.to_owned()).or_insert_with(compile).clone()
+    }
+
     fn run(&self, loaded: &Loaded, entry: &str, queries: &[Query], answers: usize, groups: [u32; 2]) -> Result<Vec<Answer>> {
-        let pipeline = self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(entry),
-            layout: Some(&self.pipeline_layout),
-            module: &self.module,
-            entry_point: Some(entry),
-            compilation_options: Default::default(),
-            cache: None,
-        });
+        let pipeline = self.pipeline(entry);
         let contents = bytemuck::cast_slice(queries);
         let query_buffer =
             self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some("queries"), contents, usage: wgpu::BufferUsages::STORAGE });

@@ -264,9 +264,7 @@ impl AuthorsMaterial {
     /// Spatial mean of the normalised values for every pair.
     fn normalised_means(&self, channel: &AuthorsChannel) -> Pairs {
         let (lights, views) = (self.rows[2], self.rows[3]);
-        let mean_of = |mode: usize, k: usize, column: usize| {
-            (0..EDGE).map(|row| channel.factor(&self.rows, mode, k, row, column)).sum::<f64>() / EDGE as f64
-        };
+        let mean_of = |mode: usize, k: usize, column: usize| (0..EDGE).map(|row| channel.factor(&self.rows, mode, k, row, column)).sum::<f64>() / EDGE as f64;
         let mut sums: BTreeMap<(usize, usize, usize), f64> = BTreeMap::new();
         let mut z = 0;
         for (block, &count) in channel.counts.iter().enumerate() {
@@ -293,9 +291,7 @@ impl AuthorsMaterial {
     /// Spatial mean of a channel for every pair, natural logarithm; of a channel without coefficients what
     /// the shared mean of all three leaves (their average is shared).
     pub fn channel_means(&self, channel: usize) -> Pairs {
-        let own = |c: &AuthorsChannel| -> Pairs {
-            self.normalised_means(c).iter().zip(&self.deviation).zip(&self.mean).map(|((n, s), m)| n * s + m).collect()
-        };
+        let own = |c: &AuthorsChannel| -> Pairs { self.normalised_means(c).iter().zip(&self.deviation).zip(&self.mean).map(|((n, s), m)| n * s + m).collect() };
         if let Some(c) = &self.channels[channel] {
             return own(c);
         }
@@ -440,7 +436,7 @@ fn quantise_channel(authors: &AuthorsChannel, rows: &[usize; 4], value_bits: u32
         })
         .collect();
     let largest_sum = blocks.iter().map(|(_, list)| list.iter().map(|c| c.1.abs()).sum::<f64>()).fold(0.0, f64::max);
-    if !(largest_sum < 2000.0) {
+    if largest_sum.is_nan() || largest_sum >= 2000.0 {
         return Err(ToolError::Usage(format!("coefficients that sum to {largest_sum} are beyond the format")));
     }
     // A record's shift of e leaves 2^(e+5) units of the accumulator for one unit of the channel.
@@ -458,7 +454,12 @@ fn quantise_channel(authors: &AuthorsChannel, rows: &[usize; 4], value_bits: u32
 }
 
 /// Atoms and records at one shift; `None` if a record's sum is too large.
-fn quantise_records(blocks: &[(usize, Vec<(AtomModel, f64)>)], dictionaries: usize, shift: u32, value_bits: u32) -> Option<(Vec<Vec<AtomModel>>, Vec<RecordModel>)> {
+fn quantise_records(
+    blocks: &[(usize, Vec<(AtomModel, f64)>)],
+    dictionaries: usize,
+    shift: u32,
+    value_bits: u32,
+) -> Option<(Vec<Vec<AtomModel>>, Vec<RecordModel>)> {
     let unit = 2f64.powi(shift as i32 + 5);
     let mut ranges: Vec<BTreeMap<u32, (AtomModel, f64, f64)>> = vec![BTreeMap::new(); dictionaries];
     for (number, list) in blocks {

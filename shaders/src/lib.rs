@@ -54,15 +54,8 @@ macro_rules! module {
 }
 
 /// Modules that every method needs, in the order of the chapters.
-pub const SHARED: &[Module] = &[
-    module!("words"),
-    module!("material"),
-    module!("fixed"),
-    module!("direction"),
-    module!("position"),
-    module!("colour"),
-    module!("interpolation"),
-];
+pub const SHARED: &[Module] =
+    &[module!("words"), module!("material"), module!("fixed"), module!("direction"), module!("position"), module!("colour"), module!("interpolation")];
 
 /// The module of the sparse ensemble.
 pub const ENSEMBLE: Module = module!("ensemble");

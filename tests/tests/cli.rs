@@ -114,7 +114,14 @@ fn no_output_is_left_half_written() {
 #[test]
 fn damaged_foreign_files_are_refused() {
     let folder = tempfile::tempdir().expect("folder");
-    let names = ["Coeffs_BTF_carpet07_1e-05_U.bin", "Coeffs_BTF_carpet07_1e-05_V.bin", "DictEnsOrth4DU.bin", "DictEnsOrth4DV.bin", "carpet07_mean_std.bin", "xyz_loc.bin"];
+    let names = [
+        "Coeffs_BTF_carpet07_1e-05_U.bin",
+        "Coeffs_BTF_carpet07_1e-05_V.bin",
+        "DictEnsOrth4DU.bin",
+        "DictEnsOrth4DV.bin",
+        "carpet07_mean_std.bin",
+        "xyz_loc.bin",
+    ];
     for name in names {
         std::fs::copy(excerpt_folder().join(name), folder.path().join(name)).expect("copy");
     }
@@ -148,7 +155,13 @@ fn the_kernel_is_translated() {
     assert_eq!(code(&["kernel", "--out", text(folder.path())]), 0);
     let spirv = std::fs::read(folder.path().join("selvedge.spv")).expect("SPIR-V");
     assert_eq!(spirv[..4], [0x03, 0x02, 0x23, 0x07]);
-    for (name, sign) in [("selvedge.wgsl", "@compute"), ("selvedge.metal", "kernel void filtered"), ("selvedge.hlsl", "numthreads"), ("selvedge_image.comp", "#version 310 es"), ("README.txt", "Bindings")] {
+    for (name, sign) in [
+        ("selvedge.wgsl", "@compute"),
+        ("selvedge.metal", "kernel void filtered"),
+        ("selvedge.hlsl", "numthreads"),
+        ("selvedge_image.comp", "#version 310 es"),
+        ("README.txt", "Bindings"),
+    ] {
         assert!(std::fs::read_to_string(folder.path().join(name)).expect(name).contains(sign), "{name}");
     }
     assert!(!std::fs::read_to_string(folder.path().join("selvedge_functions.wgsl")).expect("WGSL").contains("@compute"));

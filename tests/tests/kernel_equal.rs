@@ -93,7 +93,8 @@ fn compare(gpu: &Gpu, files: &[(Vec<u8>, Vec<u8>)], samples: usize, what: &str, 
     while texels < samples {
         let material = &materials[number % materials.len()];
         let size = material.image_size(0);
-        let mut direction = || Direction { x_q14: random.range(-16_384, 16_384) as i32, y_q14: random.range(-16_384, 16_384) as i32, z_q15: random.range(0, 32_768) as i32 };
+        let mut direction =
+            || Direction { x_q14: random.range(-16_384, 16_384) as i32, y_q14: random.range(-16_384, 16_384) as i32, z_q15: random.range(0, 32_768) as i32 };
         let (light, view) = (direction(), direction());
         let query = Query { material: (number % materials.len()) as u32, light: direction_words(light), view: direction_words(view), ..Query::default() };
         let answers = gpu.image(&loaded, query, size).expect("image");

@@ -23,7 +23,9 @@ fn offences(function: &naga::Function) -> Vec<String> {
     let name = function.name.clone().unwrap_or_default();
     let bad = function.expressions.iter().filter_map(|(_, expression)| match expression {
         naga::Expression::Binary { op: naga::BinaryOperator::Divide | naga::BinaryOperator::Modulo, .. } => Some("divides"),
-        naga::Expression::Literal(naga::Literal::F32(_) | naga::Literal::F64(_) | naga::Literal::F16(_) | naga::Literal::AbstractFloat(_)) => Some("has a float"),
+        naga::Expression::Literal(naga::Literal::F32(_) | naga::Literal::F64(_) | naga::Literal::F16(_) | naga::Literal::AbstractFloat(_)) => {
+            Some("has a float")
+        }
         naga::Expression::As { kind: naga::ScalarKind::Float, .. } => Some("converts to float"),
         _ => None,
     });
@@ -55,7 +57,8 @@ fn the_kernel_has_no_float_and_no_division() {
 #[test]
 fn planted_offences_are_found() {
     let source = assemble(&Request { methods: ALL, entries: true });
-    for planted in ["fn bad(a: i32) -> i32 { return a / 3; }", "fn bad(a: u32) -> u32 { return a % 3u; }", "fn bad(a: u32) -> f32 { return bitcast<f32>(a); }"] {
+    for planted in ["fn bad(a: i32) -> i32 { return a / 3; }", "fn bad(a: u32) -> u32 { return a % 3u; }", "fn bad(a: u32) -> f32 { return bitcast<f32>(a); }"]
+    {
         let module = parse(&format!("{source}\n{planted}"));
         assert!(!integer_only(&module).is_empty(), "{planted}");
     }

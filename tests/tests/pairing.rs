@@ -19,12 +19,15 @@ fn root() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
 }
 
+/// Names with their types, in order.
+type Named = Vec<(String, String)>;
+
 /// One side of a module in a common form.
 #[derive(Debug, Default, PartialEq)]
 struct Side {
     /// Name, parameters and result, in order of the source.
-    functions: Vec<(String, Vec<(String, String)>, String)>,
-    structs: BTreeMap<String, Vec<(String, String)>>,
+    functions: Vec<(String, Named, String)>,
+    structs: BTreeMap<String, Named>,
     constants: BTreeMap<String, i64>,
     rules: Vec<String>,
 }

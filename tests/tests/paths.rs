@@ -13,9 +13,8 @@ fn direction(random: &mut Random) -> Direction {
 }
 
 fn batch_equals_plain(material: &Selvedge<'_>, random: &mut Random, count: usize) {
-    let queries: Vec<FilteredQuery> = (0..count)
-        .map(|_| FilteredQuery { u_q32: random.word(), v_q32: random.word(), light: direction(random), view: direction(random) })
-        .collect();
+    let queries: Vec<FilteredQuery> =
+        (0..count).map(|_| FilteredQuery { u_q32: random.word(), v_q32: random.word(), light: direction(random), view: direction(random) }).collect();
     let mut scratch = vec![-1; material.batch_scratch_len(count)];
     let mut out = vec![Rgb::default(); count];
     material.sample_batch(&queries, &mut scratch, &mut out).expect("buffers fit");

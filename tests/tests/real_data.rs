@@ -75,7 +75,10 @@ fn hold_error(folder: &std::path::Path, pairs: usize) {
         let pairs: Vec<[usize; 2]> = (0..pairs).map(|i| [(i * 37 + 5) % 151, (i * 61 + 9) % 151]).collect();
         for channel in [1, 2] {
             let error = channel_error(&authors, &material, channel, &pairs);
-            println!("{name} channel {channel}: texture part {:.1} dB, whole error {:.1} dB, largest {:.1e}", error.texture_snr_db, error.total_snr_db, error.largest);
+            println!(
+                "{name} channel {channel}: texture part {:.1} dB, whole error {:.1} dB, largest {:.1e}",
+                error.texture_snr_db, error.total_snr_db, error.largest
+            );
             assert!(error.texture_snr_db >= 43.0 && error.largest < STATED_ERROR);
         }
     }

@@ -39,7 +39,8 @@ fn every_rule_that_a_comment_cites_is_in_the_specification() {
                 for word in comment.split(|c: char| !(c.is_ascii_digit() || c == '.' || c == '-')) {
                     let word = word.trim_end_matches(['.', '-']);
                     let parts: Vec<&str> = word.split(['.', '-']).collect();
-                    let is_rule = word.contains('.') && word.contains('-') && parts.len() == 3 && word.find('.') < word.find('-') && parts.iter().all(|p| !p.is_empty());
+                    let is_rule =
+                        word.contains('.') && word.contains('-') && parts.len() == 3 && word.find('.') < word.find('-') && parts.iter().all(|p| !p.is_empty());
                     if is_rule {
                         cited += 1;
                         assert!(stated.contains(word), "{}: {word} is cited and not stated", path.display());
