@@ -39,6 +39,7 @@ pub struct Record {
 }
 
 /// `count` low bits of a window, for `count <= 31` (10.4-1).
+#[inline(always)]
 pub fn low_part(window: u32, count: u32) -> u32 {
     // 10.4-1: a mask by shift; the count never reaches 32.
     window & ((1u32 << count).wrapping_sub(1))
@@ -75,6 +76,7 @@ pub fn read_record(words: Words<'_>, start: u32, block: u32) -> Record {
 /// The integer coefficient that a stored value stands for (10.5-1).
 ///
 /// `value < 2^16` and `step < 2^16`, so the product with the half added is below 2^32.
+#[inline(always)]
 pub fn dequantise(quantiser: u32, value: u32, value_bits: u32) -> i32 {
     let base = ((quantiser << 16) as i32) >> 16;
     let step = quantiser >> 16;
@@ -84,6 +86,7 @@ pub fn dequantise(quantiser: u32, value: u32, value_bits: u32) -> i32 {
 }
 
 /// One column of three rows of a factor by their weights, Q15 (10.6-1).
+#[inline(always)]
 pub fn blend_column(words: Words<'_>, table: u32, row_words: u32, taps: Taps, column: u32) -> i32 {
     let a = packed_i16(words, table.wrapping_add(taps.a.wrapping_mul(row_words)), column).wrapping_mul(taps.weight_a_q15);
     let b = packed_i16(words, table.wrapping_add(taps.b.wrapping_mul(row_words)), column).wrapping_mul(taps.weight_b_q15);
@@ -93,6 +96,7 @@ pub fn blend_column(words: Words<'_>, table: u32, row_words: u32, taps: Taps, co
 }
 
 /// One column of two rows of a spatial factor by their weights, Q15 (10.6-2).
+#[inline(always)]
 pub fn blend_span(words: Words<'_>, table: u32, row_words: u32, span: Span, column: u32) -> i32 {
     let a = packed_i16(words, table.wrapping_add(span.row_a.wrapping_mul(row_words)), column).wrapping_mul(span.weight_a_q15);
     let b = packed_i16(words, table.wrapping_add(span.row_b.wrapping_mul(row_words)), column).wrapping_mul(span.weight_b_q15);

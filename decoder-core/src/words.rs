@@ -20,10 +20,9 @@ pub struct Words<'a> {
 #[inline(always)]
 pub fn word(words: Words<'_>, index: u32) -> u32 {
     let bytes = if index < DICTIONARY_START { words.file } else { words.dictionary };
-    let start = ((index & 0x7fff_ffff) as usize).wrapping_mul(4);
-    match bytes.get(start..) {
-        Some([a, b, c, d, ..]) => u32::from_le_bytes([*a, *b, *c, *d]),
-        _ => 0,
+    match bytes.as_chunks::<4>().0.get((index & 0x7fff_ffff) as usize) {
+        Some(chunk) => u32::from_le_bytes(*chunk),
+        None => 0,
     }
 }
 

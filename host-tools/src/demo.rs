@@ -74,7 +74,7 @@ pub fn channel_error(authors: &AuthorsMaterial, material: &Selvedge<'_>, channel
     ChannelError { texture_snr_db: 10.0 * (signal / texture_error).log10(), total_snr_db: 10.0 * (signal / error).log10(), largest }
 }
 
-/// A point light seen on a ball of the material: orthographic, the texture wrapped around.
+/// A ball of the material under a distant light: orthographic, the texture laid on from the front.
 pub fn render_ball(material: &Selvedge<'_>, size: usize, light: glam::DVec3, exposure: f32) -> Result<Picture> {
     const OVERSAMPLING: usize = 2;
     let wide = size * OVERSAMPLING;
@@ -88,14 +88,14 @@ pub fn render_ball(material: &Selvedge<'_>, size: usize, light: glam::DVec3, exp
                 continue;
             }
             let normal = glam::DVec3::new(px, -py, (1.0 - square).sqrt());
-            let tangent = glam::DVec3::new(normal.z, 0.0, -normal.x).normalize_or(glam::DVec3::X);
+            let tangent = (glam::DVec3::X - normal * normal.x).normalize_or(glam::DVec3::Z);
             let bitangent = normal.cross(tangent);
             let local = |v: glam::DVec3| {
                 let [x, y, z] = [v.dot(tangent), v.dot(bitangent), v.dot(normal)].map(|c| c as f32);
                 Direction::from_unit_vector([x, y, z])
             };
             let fraction = |turns: f64| (turns.rem_euclid(1.0) * 4_294_967_296.0) as u32;
-            let (u, v) = (normal.x.atan2(normal.z) * 2.2, normal.y.asin() * 2.2);
+            let (u, v) = (normal.x.asin() * 1.6, normal.y.asin() * 1.6);
             queries.push(FilteredQuery { u_q32: fraction(u), v_q32: fraction(v), light: local(light), view: local(glam::DVec3::Z) });
             places.push(y / OVERSAMPLING * size + x / OVERSAMPLING);
         }
@@ -267,7 +267,7 @@ pub fn run(out: &Path, say: &mut dyn FnMut(String)) -> Result<()> {
             }
         }
         let light = glam::DVec3::new(-0.45, 0.5, 0.74).normalize();
-        balls.push(render_ball(material, 400, light, 4.0)?);
+        balls.push(render_ball(material, 400, light, 6.0)?);
         let light = Direction::from_unit_vector([0.35, 0.3, 0.887]);
         let view = Direction::from_unit_vector([0.0, 0.0, 1.0]);
         let swatch = decode_picture(material, 0, light, view)?;

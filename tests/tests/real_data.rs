@@ -115,6 +115,7 @@ fn values_are_continuous_in_the_directions() {
         let material = selvedge::open(&bytes, &Limits::default()).expect("legal");
         let mut random = Random::new(5);
         let mut largest = [0i32; 3];
+        let mut largest_rgb = [0.0f64; 3];
         for arc in 0..300 {
             let mut unit = || loop {
                 let v = glam(&mut random);
@@ -140,11 +141,18 @@ fn values_are_continuous_in_the_directions() {
                         *largest = (*largest).max((a - b).abs());
                     }
                 }
+                if let Some(before) = before {
+                    let difference = [now.c0 - before.c0, now.c1 - before.c1, now.c2 - before.c2].map(natural);
+                    for (largest, row) in largest_rgb.iter_mut().zip(sparsebtf::YUV_TO_RGB) {
+                        *largest = largest.max((0..3).map(|i| row[i] * difference[i]).sum::<f64>().abs());
+                    }
+                }
                 before = Some(now);
             }
         }
         let largest = largest.map(natural);
         println!("{name}: largest steps of the log value for 0.01 degrees: Y {:.5}, U {:.5}, V {:.5}", largest[0], largest[1], largest[2]);
+        println!("{name}: of the logs of R, G, B: {:.5}, {:.5}, {:.5}", largest_rgb[0], largest_rgb[1], largest_rgb[2]);
         assert!(largest.iter().all(|&step| step <= 0.001), "{largest:?}");
         assert!(largest[0] > 0.0);
     }
