@@ -6,7 +6,7 @@
 
 use crate::colour::{Rgb, Values};
 use crate::direction::{
-    Direction, Taps, beyond_hull, clamp_direction, cross, dot_product, grid_cell, grid_start, hull_start, point, ratio_q15, triangles_start,
+    Direction, Taps, beyond_hull, clamp_direction, coarse_q14, cross, dot_product, grid_cell, grid_start, hull_start, point, ratio_q15, refine, triangles_start,
 };
 use crate::ensemble::Record;
 use crate::fixed::{HALF_Q15, ONE_Q15, clamp_magnitude, multiply_q15, round_shift};
@@ -398,8 +398,8 @@ fn line(value: impl Fn(i32, i32) -> i32) -> [i32; 3] {
 
 /// The value of a line at a point.
 #[inline(always)]
-fn at_point(x: i32, y: i32, c: i32, direction: &Direction) -> i32 {
-    x.wrapping_mul(direction.x_q14).wrapping_add(y.wrapping_mul(direction.y_q14)).wrapping_add(c)
+fn at_point(x: i32, y: i32, c: i32, point: (i32, i32)) -> i32 {
+    x.wrapping_mul(point.0).wrapping_add(y.wrapping_mul(point.1)).wrapping_add(c)
 }
 
 impl<'a, 's> ReadySet<'a, 's> {
@@ -439,19 +439,23 @@ impl<'a, 's> ReadySet<'a, 's> {
     fn locate(&self, asked: Direction) -> Taps {
         let direction = clamp_direction(asked);
         let size = self.grid_size;
-        let cell = grid_cell(direction.y_q14, size).wrapping_mul(size).wrapping_add(grid_cell(direction.x_q14, size));
+        let p = (coarse_q14(direction.x_q18), coarse_q14(direction.y_q18));
+        let cell = grid_cell(p.1, size).wrapping_mul(size).wrapping_add(grid_cell(p.0, size));
         let candidates = self.grid.wrapping_add(size.wrapping_mul(size)).wrapping_add(1);
         let first = word(self.words, self.grid.wrapping_add(cell));
         let last = word(self.words, self.grid.wrapping_add(cell).wrapping_add(1));
         for candidate in first..last {
             let number = word(self.words, candidates.wrapping_add(candidate));
             let Some(&[a0, a1, a2, b0, b1, b2, c0, c1, c2, first, second, reciprocal]) = self.triangles.get(number as usize) else { break };
-            let area_a = at_point(a0, a1, a2, &direction);
-            let area_b = at_point(b0, b1, b2, &direction);
-            if (area_a | area_b | at_point(c0, c1, c2, &direction)) >= 0 {
+            let area_a = at_point(a0, a1, a2, p);
+            let area_b = at_point(b0, b1, b2, p);
+            let area_c = at_point(c0, c1, c2, p);
+            if (area_a | area_b | area_c) >= 0 {
+                let whole = area_a.wrapping_add(area_b).wrapping_add(area_c);
                 let shift = second as u32 >> 16;
-                let weight_a = ratio_q15(area_a, shift, reciprocal as u32, ONE_Q15);
-                let weight_b = ratio_q15(area_b, shift, reciprocal as u32, ONE_Q15.wrapping_sub(weight_a));
+                let rest = (direction.x_q18.wrapping_sub(p.0 << 4), direction.y_q18.wrapping_sub(p.1 << 4));
+                let weight_a = ratio_q15(refine(area_a, whole, a0, a1, rest.0, rest.1), shift, reciprocal as u32, ONE_Q15);
+                let weight_b = ratio_q15(refine(area_b, whole, b0, b1, rest.0, rest.1), shift, reciprocal as u32, ONE_Q15.wrapping_sub(weight_a));
                 return Taps {
                     a: first as u32 & 0xffff,
                     b: first as u32 >> 16,
@@ -468,9 +472,10 @@ impl<'a, 's> ReadySet<'a, 's> {
 
     /// [`crate::direction::locate_on_hull`], the same bits.
     fn locate_on_hull(&self, direction: Direction) -> Taps {
+        let p = (coarse_q14(direction.x_q18), coarse_q14(direction.y_q18));
         let on_edge = |edge: &[i32; EDGE_WORDS]| {
-            let along = at_point(edge[0], edge[1], edge[2], &direction);
-            (along, edge[6].wrapping_sub(along), at_point(edge[3], edge[4], edge[5], &direction))
+            let along = at_point(edge[0], edge[1], edge[2], p);
+            (along, edge[6].wrapping_sub(along), at_point(edge[3], edge[4], edge[5], p))
         };
         let Some(last) = self.edges.last() else {
             return beyond_hull(self.words, self.start, direction, 0, 0, 0);
@@ -481,7 +486,8 @@ impl<'a, 's> ReadySet<'a, 's> {
             let (along, left, outside) = on_edge(edge);
             let a = edge[7] as u32 & 0xffff;
             if (along | left | outside) >= 0 {
-                let weight_b = ratio_q15(along, edge[7] as u32 >> 16, edge[8] as u32, ONE_Q15);
+                let rest = (direction.x_q18.wrapping_sub(p.0 << 4), direction.y_q18.wrapping_sub(p.1 << 4));
+                let weight_b = ratio_q15(refine(along, edge[6], edge[0], edge[1], rest.0, rest.1), edge[7] as u32 >> 16, edge[8] as u32, ONE_Q15);
                 return beyond_hull(self.words, self.start, direction, a, edge[9] as u32, weight_b);
             }
             if past_previous & (along < 0) {

@@ -13,9 +13,9 @@ pub const fn record_operations(count: u32, edge: u32) -> u64 {
 }
 
 /// Operations to locate a direction at worst (4.2-3): the grid (2), every candidate (6), every edge of the hull
-/// (6), the begin of the hull, a ratio and two cosines (5).
+/// (6), the begin of the hull, what refines, a ratio and two cosines (7).
 const fn locate_operations(candidates: u32, hull_count: u32) -> u64 {
-    2 + 6 * candidates as u64 + 6 * hull_count as u64 + 5
+    2 + 6 * candidates as u64 + 6 * hull_count as u64 + 7
 }
 
 /// What the cost of a sample depends on beside the records (4.2-1).

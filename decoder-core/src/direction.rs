@@ -1,14 +1,17 @@
 //! Directions and their triangulation (chapter 5). Twin: `shaders/wgsl/direction.wgsl`.
 //!
-//! A direction is a point of the unit disc under the stereographic projection `x/(1+z), y/(1+z)`, in
-//! Q14, with its cosine in Q15. A sample set is located by a grid of candidate triangles with exact
-//! integer orientation tests; beyond the hull the point moves to the nearest place on it.
+//! A direction is a point of the unit disc under the stereographic projection `x/(1+z), y/(1+z)`, with
+//! its cosine in Q15. Samples have 14 fraction bits, so that every orientation test is exact in 32 bits;
+//! a query has four more, which refine the weights once its triangle is found. A set is located by a grid
+//! of candidate triangles; beyond the hull the point moves to the nearest place on it.
 
-use crate::fixed::{HALF_Q15, ONE_Q15, divide_q15, round_shift};
+use crate::fixed::{HALF_Q15, ONE_Q15, divide, round_shift};
 use crate::words::{Words, high_i16, low_i16, word};
 
 /// One in Q14: the radius of the disc.
 pub const ONE_Q14: i32 = 16384;
+/// One in Q18.
+pub const ONE_Q18: i32 = 262_144;
 /// One in Q30.
 pub const ONE_Q30: i32 = 0x4000_0000;
 
@@ -16,10 +19,10 @@ pub const ONE_Q30: i32 = 0x4000_0000;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
 pub struct Direction {
-    /// `x / (1 + z)`, in `-ONE_Q14 ..= ONE_Q14`.
-    pub x_q14: i32,
-    /// `y / (1 + z)`, in `-ONE_Q14 ..= ONE_Q14`.
-    pub y_q14: i32,
+    /// `x / (1 + z)`, in `-ONE_Q18 ..= ONE_Q18`.
+    pub x_q18: i32,
+    /// `y / (1 + z)`, in `-ONE_Q18 ..= ONE_Q18`.
+    pub y_q18: i32,
     /// Cosine of the angle from the surface normal, in `0 ..= ONE_Q15`.
     pub z_q15: i32,
 }
@@ -60,10 +63,10 @@ pub fn binary32_to_q30(bits: u32) -> i32 {
     magnitude
 }
 
-/// `round(|n| / d * 2^14)` with the sign of `n`, for `|n| <= d` (5.2-2).
-pub fn project_q14(n: i32, d: u32) -> i32 {
+/// `round(|n| / d * 2^18)` with the sign of `n`, for `|n| <= d` (5.2-2).
+pub fn project_q18(n: i32, d: u32) -> i32 {
     // 5.2-2: one more bit than needed, then halves up.
-    let magnitude = (divide_q15(n.unsigned_abs(), d).wrapping_add(1) >> 1) as i32;
+    let magnitude = (divide(n.unsigned_abs(), d, 19).wrapping_add(1) >> 1) as i32;
     if n < 0 {
         return magnitude.wrapping_neg();
     }
@@ -77,15 +80,15 @@ pub fn direction_from_binary32(x_bits: u32, y_bits: u32, z_bits: u32) -> Directi
     let z_q30 = binary32_to_q30(z_bits);
     // 5.2-3: below the horizon the point is that of the mirrored vector and the cosine is zero.
     let d = (ONE_Q30 as u32).wrapping_add(z_q30.unsigned_abs());
-    Direction { x_q14: project_q14(x_q30, d), y_q14: project_q14(y_q30, d), z_q15: round_shift(z_q30.max(0), 15) }
+    Direction { x_q18: project_q18(x_q30, d), y_q18: project_q18(y_q30, d), z_q15: round_shift(z_q30.max(0), 15) }
 }
 
 /// The direction with every part within its range (5.1-2).
 pub fn clamp_direction(direction: Direction) -> Direction {
     // 5.1-2: what lies outside the ranges is moved to their ends.
     Direction {
-        x_q14: direction.x_q14.min(ONE_Q14).max(-ONE_Q14),
-        y_q14: direction.y_q14.min(ONE_Q14).max(-ONE_Q14),
+        x_q18: direction.x_q18.min(ONE_Q18).max(-ONE_Q18),
+        y_q18: direction.y_q18.min(ONE_Q18).max(-ONE_Q18),
         z_q15: direction.z_q15.min(ONE_Q15).max(0),
     }
 }
@@ -143,6 +146,21 @@ pub fn ratio_q15(part: i32, shift: u32, reciprocal: u32, limit: i32) -> i32 {
     (ratio as i32).min(limit)
 }
 
+/// The nearest point with 14 fraction bits (5.4-6).
+pub fn coarse_q14(q18: i32) -> i32 {
+    // 5.4-6: halves up; at most 2^14.
+    q18.wrapping_add(8) >> 4
+}
+
+/// An area or a product along an edge, moved by what a query has beyond 14 fraction bits, and kept from zero to the whole (5.4-7).
+///
+/// `step_x` and `step_y` are what one unit of Q14 adds, at most 2^15; the rests are -8 to 7 sixteenths.
+pub fn refine(part: i32, whole: i32, step_x: i32, step_y: i32, rest_x: i32, rest_y: i32) -> i32 {
+    // 5.4-7: the sum of products is within 2^19.
+    let moved = part.wrapping_add(step_x.wrapping_mul(rest_x).wrapping_add(step_y.wrapping_mul(rest_y)) >> 4);
+    moved.min(whole).max(0)
+}
+
 /// The cell of the grid along one axis (5.5-1).
 pub fn grid_cell(q14: i32, grid_size: u32) -> u32 {
     // 5.5-1: the last cell is closed.
@@ -153,8 +171,8 @@ pub fn grid_cell(q14: i32, grid_size: u32) -> u32 {
 /// The taps of a direction in the set at `start` (5.6).
 pub fn locate(words: Words<'_>, start: u32, asked: Direction) -> Taps {
     let direction = clamp_direction(asked);
-    let px = direction.x_q14;
-    let py = direction.y_q14;
+    let px = coarse_q14(direction.x_q18);
+    let py = coarse_q14(direction.y_q18);
     let triangles = triangles_start(words, start);
     let grid = grid_start(words, start);
     let grid_size = word(words, start.wrapping_add(3));
@@ -184,11 +202,16 @@ pub fn locate(words: Words<'_>, start: u32, asked: Direction) -> Taps {
         let area_c = cross(ax, ay, bx, by, px, py);
         // One test for three signs: the sign bit of the union is set if any is negative.
         if (area_a | area_b | area_c) >= 0 {
-            // 5.6-2: two weights by reciprocal, the last is what is left.
+            // 5.6-2: two weights by reciprocal, from areas at the query's full precision; the last is what is left.
+            let rest_x = direction.x_q18.wrapping_sub(px << 4);
+            let rest_y = direction.y_q18.wrapping_sub(py << 4);
+            let whole = area_a.wrapping_add(area_b).wrapping_add(area_c);
+            let fine_a = refine(area_a, whole, by.wrapping_sub(cy), cx.wrapping_sub(bx), rest_x, rest_y);
+            let fine_b = refine(area_b, whole, cy.wrapping_sub(ay), ax.wrapping_sub(cx), rest_x, rest_y);
             let shift = second >> 16;
             let reciprocal = word(words, triangle.wrapping_add(2));
-            let weight_a = ratio_q15(area_a, shift, reciprocal, ONE_Q15);
-            let weight_b = ratio_q15(area_b, shift, reciprocal, ONE_Q15.wrapping_sub(weight_a));
+            let weight_a = ratio_q15(fine_a, shift, reciprocal, ONE_Q15);
+            let weight_b = ratio_q15(fine_b, shift, reciprocal, ONE_Q15.wrapping_sub(weight_a));
             let weight_c = ONE_Q15.wrapping_sub(weight_a).wrapping_sub(weight_b);
             // 5.6-3: at and below the horizon no light arrives.
             let cosine = if direction.z_q15 > 0 { ONE_Q15 } else { 0 };
@@ -201,8 +224,8 @@ pub fn locate(words: Words<'_>, start: u32, asked: Direction) -> Taps {
 
 /// The taps of the place on the hull nearest to a point that no triangle holds (5.7).
 pub fn locate_on_hull(words: Words<'_>, start: u32, direction: Direction) -> Taps {
-    let px = direction.x_q14;
-    let py = direction.y_q14;
+    let px = coarse_q14(direction.x_q18);
+    let py = coarse_q14(direction.y_q18);
     let hull = hull_start(words, start);
     let hull_count = word(words, start.wrapping_add(2));
     // 5.7-4: a set of one direction has no hull.
@@ -232,7 +255,10 @@ pub fn locate_on_hull(words: Words<'_>, start: u32, direction: Direction) -> Tap
         // 5.7-2: the foot of the perpendicular lies on this edge and the point is not inside of it.
         if (along | left | outside) >= 0 {
             let reciprocal = word(words, hull.wrapping_add(edge.wrapping_mul(2)).wrapping_add(1));
-            let weight_b = ratio_q15(along, first >> 16, reciprocal, ONE_Q15);
+            let rest_x = direction.x_q18.wrapping_sub(px << 4);
+            let rest_y = direction.y_q18.wrapping_sub(py << 4);
+            let fine = refine(along, along.wrapping_add(left), bx.wrapping_sub(ax), by.wrapping_sub(ay), rest_x, rest_y);
+            let weight_b = ratio_q15(fine, first >> 16, reciprocal, ONE_Q15);
             return beyond_hull(words, start, direction, a, b, weight_b);
         }
         // 5.7-3: between two edges: past the end of the one, before the begin of the other.
@@ -267,7 +293,7 @@ pub fn beyond_hull(words: Words<'_>, start: u32, direction: Direction, a: u32, b
     let sampled = za.wrapping_add(zb).wrapping_add(HALF_Q15) >> 15;
     let mut cosine = if direction.z_q15 > 0 { ONE_Q15 } else { 0 };
     if direction.z_q15 < sampled {
-        cosine = divide_q15(direction.z_q15 as u32, sampled as u32) as i32;
+        cosine = divide(direction.z_q15 as u32, sampled as u32, 15) as i32;
     }
     Taps { a, b, c: a, weight_a_q15: weight_a, weight_b_q15: weight_b, weight_c_q15: 0, cosine_q15: cosine }
 }
@@ -293,16 +319,16 @@ mod tests {
     fn vectors_are_projected() {
         for (vector, want) in [
             ([0.0f32, 0.0, 1.0], (0, 0, ONE_Q15)),
-            ([1.0, 0.0, 0.0], (ONE_Q14, 0, 0)),
-            ([0.0, -1.0, 0.0], (0, -ONE_Q14, 0)),
-            ([0.6, 0.0, 0.8], (5461, 0, 26214)),
-            ([0.6, 0.0, -0.8], (5461, 0, 0)),
+            ([1.0, 0.0, 0.0], (ONE_Q18, 0, 0)),
+            ([0.0, -1.0, 0.0], (0, -ONE_Q18, 0)),
+            ([0.6, 0.0, 0.8], (87_381, 0, 26214)),
+            ([0.6, 0.0, -0.8], (87_381, 0, 0)),
             ([0.0, 0.0, -1.0], (0, 0, 0)),
-            ([f32::NAN, f32::INFINITY, f32::NEG_INFINITY], (ONE_Q14 / 2, ONE_Q14 / 2, 0)),
+            ([f32::NAN, f32::INFINITY, f32::NEG_INFINITY], (ONE_Q18 / 2, ONE_Q18 / 2, 0)),
         ] {
             let [x, y, z] = vector.map(f32::to_bits);
             let got = direction_from_binary32(x, y, z);
-            assert_eq!((got.x_q14, got.y_q14, got.z_q15), want, "{vector:?}");
+            assert_eq!((got.x_q18, got.y_q18, got.z_q15), want, "{vector:?}");
         }
     }
 }

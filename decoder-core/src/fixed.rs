@@ -55,12 +55,12 @@ pub fn product_high(a: u32, b: u32) -> u32 {
     ((a as u64).wrapping_mul(b as u64) >> 32) as u32
 }
 
-/// `floor(n * 2^15 / d)` for `n <= d`, `1 <= d <= 2^31` (2.2-5).
-pub fn divide_q15(n: u32, d: u32) -> u32 {
+/// `floor(n * 2^bits / d)` for `n <= d`, `1 <= d <= 2^31`, `bits <= 19` (2.2-5).
+pub fn divide(n: u32, d: u32, bits: u32) -> u32 {
     let mut remainder = n;
     let mut quotient = 0u32;
     // 2.2-5: restoring division; the remainder stays below d, so doubling it fits 32 bits.
-    for _step in 0..16u32 {
+    for _step in 0..bits.wrapping_add(1) {
         quotient <<= 1;
         if remainder >= d {
             remainder = remainder.wrapping_sub(d);
@@ -165,7 +165,9 @@ mod tests {
         for (p, u) in draws() {
             let d = (p as u32 & 0x7fff_ffff).max(1);
             let n = (u.unsigned_abs().wrapping_mul(0x9e37_79b9)) % (d + 1);
-            assert_eq!(divide_q15(n, d) as u64, ((n as u64) << 15) / d as u64);
+            for bits in [15, 19] {
+                assert_eq!(divide(n, d, bits) as u64, ((n as u64) << bits) / d as u64);
+            }
         }
     }
 

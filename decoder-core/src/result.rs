@@ -62,10 +62,10 @@ pub fn next_query_word(state: &mut u32) -> u32 {
 /// A direction of the query sequence (11.2-3): any point of the square, any cosine.
 fn next_query_direction(state: &mut u32) -> Direction {
     let word = next_query_word(state);
-    let x_q14 = ((word & 0x7fff) as i32).wrapping_sub(16384);
-    let y_q14 = (((word >> 15) & 0x7fff) as i32).wrapping_sub(16384);
+    let x_q18 = (((word & 0xffff) << 3) as i32).wrapping_sub(262_144);
+    let y_q18 = (((word >> 16) << 3) as i32).wrapping_sub(262_144);
     let z_q15 = (next_query_word(state) & 0x7fff) as i32;
-    Direction { x_q14, y_q14, z_q15 }
+    Direction { x_q18, y_q18, z_q15 }
 }
 
 impl Selvedge<'_> {

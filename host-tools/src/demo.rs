@@ -201,7 +201,7 @@ pub fn random_query(random: &mut Random, entry: &str, material: u32) -> crate::g
             let r = (1.0 - z * z).max(0.0).sqrt();
             [r * azimuth.cos(), r * azimuth.sin(), z].map(f32::to_bits)
         }
-        _ => [random.range(-16_400, 16_400), random.range(-16_400, 16_400), random.range(-9, 32_800)].map(|c| c as u32),
+        _ => [random.range(-262_400, 262_400), random.range(-262_400, 262_400), random.range(-9, 32_800)].map(|c| c as u32),
     };
     let (light, view) = (direction(), direction());
     let (u, v) = match entry {

@@ -44,7 +44,7 @@ impl Answer {
 
 /// The words of a direction in a query.
 pub fn direction_words(direction: Direction) -> [u32; 3] {
-    [direction.x_q14 as u32, direction.y_q14 as u32, direction.z_q15 as u32]
+    [direction.x_q18 as u32, direction.y_q18 as u32, direction.z_q15 as u32]
 }
 
 /// What the core answers to a query of an entry point.
@@ -59,7 +59,7 @@ pub fn answer_on_cpu(material: &Selvedge<'_>, entry: &str, query: &Query) -> Ans
         let values = material.point_values(query.u, query.v, lx, vx);
         return Answer::new(radiance(m, values, single_tap(lx)), values);
     }
-    let direction = |[x, y, z]: [u32; 3]| Direction { x_q14: x as i32, y_q14: y as i32, z_q15: z as i32 };
+    let direction = |[x, y, z]: [u32; 3]| Direction { x_q18: x as i32, y_q18: y as i32, z_q15: z as i32 };
     let floats = entry == "floats";
     let of = |x, y, z| if floats { direction_from_binary32(x, y, z) } else { direction([x, y, z]) };
     let (light, view) = (material.locate_light(of(lx, ly, lz)), material.locate_view(of(vx, vy, vz)));

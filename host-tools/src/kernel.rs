@@ -65,7 +65,7 @@ Bindings of the Selvedge kernel, all in group (set, space) 0:
 
 Entry points texel, filtered, trilinear and floats answer query i in invocation i, in groups of 64.
 texel:      u, v are a texel; light[0], view[0] are numbers of sample directions.
-filtered:   u, v are u0.32 fractions; light and view are x and y in Q14 of the disc and the cosine in Q15.
+filtered:   u, v are u0.32 fractions; light and view are x and y in Q18 of the disc and the cosine in Q15.
 trilinear:  the same between two levels of detail.
 floats:     u, v, light and view are binary32 bits: positions and unit vectors.
 image:      query 0 names material and directions; an invocation in groups of 8 x 8 is a texel.

@@ -1,18 +1,21 @@
 // Directions and their triangulation (chapter 5). Twin: decoder-core/src/direction.rs.
 //
-// A direction is a point of the unit disc under the stereographic projection x/(1+z), y/(1+z), in
-// Q14, with its cosine in Q15. A sample set is located by a grid of candidate triangles with exact
-// integer orientation tests; beyond the hull the point moves to the nearest place on it.
+// A direction is a point of the unit disc under the stereographic projection x/(1+z), y/(1+z), with
+// its cosine in Q15. Samples have 14 fraction bits, so that every orientation test is exact in 32 bits;
+// a query has four more, which refine the weights once its triangle is found. A set is located by a grid
+// of candidate triangles; beyond the hull the point moves to the nearest place on it.
 
 // One in Q14: the radius of the disc.
 const ONE_Q14: i32 = 16384;
+// One in Q18.
+const ONE_Q18: i32 = 262144;
 // One in Q30.
 const ONE_Q30: i32 = 0x40000000;
 
 // A direction of the upper hemisphere, or below it with a zero cosine.
 struct Direction {
-    x_q14: i32,
-    y_q14: i32,
+    x_q18: i32,
+    y_q18: i32,
     z_q15: i32,
 }
 
@@ -46,10 +49,10 @@ fn binary32_to_q30(bits: u32) -> i32 {
     return magnitude;
 }
 
-// round(|n| / d * 2^14) with the sign of n, for |n| <= d (5.2-2).
-fn project_q14(n: i32, d: u32) -> i32 {
+// round(|n| / d * 2^18) with the sign of n, for |n| <= d (5.2-2).
+fn project_q18(n: i32, d: u32) -> i32 {
     // 5.2-2: one more bit than needed, then halves up.
-    let magnitude = i32((divide_q15(u32(abs(n)), d) + 1u) >> 1u);
+    let magnitude = i32((divide(u32(abs(n)), d, 19u) + 1u) >> 1u);
     if (n < 0) {
         return -magnitude;
     }
@@ -63,15 +66,15 @@ fn direction_from_binary32(x_bits: u32, y_bits: u32, z_bits: u32) -> Direction {
     let z_q30 = binary32_to_q30(z_bits);
     // 5.2-3: below the horizon the point is that of the mirrored vector and the cosine is zero.
     let d = u32(ONE_Q30) + u32(abs(z_q30));
-    return Direction(project_q14(x_q30, d), project_q14(y_q30, d), round_shift(max(z_q30, 0), 15u));
+    return Direction(project_q18(x_q30, d), project_q18(y_q30, d), round_shift(max(z_q30, 0), 15u));
 }
 
 // The direction with every part within its range (5.1-2).
 fn clamp_direction(direction: Direction) -> Direction {
     // 5.1-2: what lies outside the ranges is moved to their ends.
     return Direction(
-        max(min(direction.x_q14, ONE_Q14), -ONE_Q14),
-        max(min(direction.y_q14, ONE_Q14), -ONE_Q14),
+        max(min(direction.x_q18, ONE_Q18), -ONE_Q18),
+        max(min(direction.y_q18, ONE_Q18), -ONE_Q18),
         max(min(direction.z_q15, ONE_Q15), 0),
     );
 }
@@ -127,6 +130,19 @@ fn ratio_q15(part: i32, shift: u32, reciprocal: u32, limit: i32) -> i32 {
     return min(i32(ratio), limit);
 }
 
+// The nearest point with 14 fraction bits (5.4-6).
+fn coarse_q14(q18: i32) -> i32 {
+    // 5.4-6: halves up; at most 2^14.
+    return (q18 + 8) >> 4u;
+}
+
+// An area or a product along an edge, moved by what a query has beyond 14 fraction bits, and kept from zero to the whole (5.4-7).
+fn refine(part: i32, whole: i32, step_x: i32, step_y: i32, rest_x: i32, rest_y: i32) -> i32 {
+    // 5.4-7: the sum of products is within 2^19.
+    let moved = part + ((step_x * rest_x + step_y * rest_y) >> 4u);
+    return max(min(moved, whole), 0);
+}
+
 // The cell of the grid along one axis (5.5-1).
 fn grid_cell(q14: i32, grid_size: u32) -> u32 {
     // 5.5-1: the last cell is closed.
@@ -137,8 +153,8 @@ fn grid_cell(q14: i32, grid_size: u32) -> u32 {
 // The taps of a direction in the set at `start` (5.6).
 fn locate(start: u32, asked: Direction) -> Taps {
     let direction = clamp_direction(asked);
-    let px = direction.x_q14;
-    let py = direction.y_q14;
+    let px = coarse_q14(direction.x_q18);
+    let py = coarse_q14(direction.y_q18);
     let triangles = triangles_start(start);
     let grid = grid_start(start);
     let grid_size = word(start + 3u);
@@ -168,11 +184,16 @@ fn locate(start: u32, asked: Direction) -> Taps {
         let area_c = cross(ax, ay, bx, by, px, py);
         // One test for three signs: the sign bit of the union is set if any is negative.
         if ((area_a | area_b | area_c) >= 0) {
-            // 5.6-2: two weights by reciprocal, the last is what is left.
+            // 5.6-2: two weights by reciprocal, from areas at the query's full precision; the last is what is left.
+            let rest_x = direction.x_q18 - (px << 4u);
+            let rest_y = direction.y_q18 - (py << 4u);
+            let whole = area_a + area_b + area_c;
+            let fine_a = refine(area_a, whole, by - cy, cx - bx, rest_x, rest_y);
+            let fine_b = refine(area_b, whole, cy - ay, ax - cx, rest_x, rest_y);
             let shift = second >> 16u;
             let reciprocal = word(triangle + 2u);
-            let weight_a = ratio_q15(area_a, shift, reciprocal, ONE_Q15);
-            let weight_b = ratio_q15(area_b, shift, reciprocal, ONE_Q15 - weight_a);
+            let weight_a = ratio_q15(fine_a, shift, reciprocal, ONE_Q15);
+            let weight_b = ratio_q15(fine_b, shift, reciprocal, ONE_Q15 - weight_a);
             let weight_c = ONE_Q15 - weight_a - weight_b;
             // 5.6-3: at and below the horizon no light arrives. select(if false, if true, condition)
             let cosine = select(0, ONE_Q15, direction.z_q15 > 0);
@@ -185,8 +206,8 @@ fn locate(start: u32, asked: Direction) -> Taps {
 
 // The taps of the place on the hull nearest to a point that no triangle holds (5.7).
 fn locate_on_hull(start: u32, direction: Direction) -> Taps {
-    let px = direction.x_q14;
-    let py = direction.y_q14;
+    let px = coarse_q14(direction.x_q18);
+    let py = coarse_q14(direction.y_q18);
     let hull = hull_start(start);
     let hull_count = word(start + 2u);
     // 5.7-4: a set of one direction has no hull.
@@ -217,7 +238,10 @@ fn locate_on_hull(start: u32, direction: Direction) -> Taps {
         // 5.7-2: the foot of the perpendicular lies on this edge and the point is not inside of it.
         if ((along | left | outside) >= 0) {
             let reciprocal = word(hull + edge * 2u + 1u);
-            let weight_b = ratio_q15(along, first >> 16u, reciprocal, ONE_Q15);
+            let rest_x = direction.x_q18 - (px << 4u);
+            let rest_y = direction.y_q18 - (py << 4u);
+            let fine = refine(along, along + left, bx - ax, by - ay, rest_x, rest_y);
+            let weight_b = ratio_q15(fine, first >> 16u, reciprocal, ONE_Q15);
             return beyond_hull(start, direction, a, b, weight_b);
         }
         // 5.7-3: between two edges: past the end of the one, before the begin of the other.
@@ -251,7 +275,7 @@ fn beyond_hull(start: u32, direction: Direction, a: u32, b: u32, weight_b: i32) 
     // select(if false, if true, condition)
     var cosine = select(0, ONE_Q15, direction.z_q15 > 0);
     if (direction.z_q15 < sampled) {
-        cosine = i32(divide_q15(u32(direction.z_q15), u32(sampled)));
+        cosine = i32(divide(u32(direction.z_q15), u32(sampled), 15u));
     }
     return Taps(a, b, a, weight_a, weight_b, 0, cosine);
 }

@@ -10,7 +10,7 @@ struct Query {
     v: u32,
     // Level of detail in Q16.
     level_q16: u32,
-    // Q14, Q14, Q15 as signed numbers; sample index and nothing; or binary32 bits of a unit vector.
+    // Q18, Q18, Q15 as signed numbers; sample index and nothing; or binary32 bits of a unit vector.
     light: array<u32, 3>,
     view: array<u32, 3>,
 }

@@ -49,12 +49,12 @@ fn product_high(a: u32, b: u32) -> u32 {
     return (a >> 16u) * (b >> 16u) + (middle_a >> 16u) + (middle_b >> 16u);
 }
 
-// floor(n * 2^15 / d) for n <= d, 1 <= d <= 2^31 (2.2-5).
-fn divide_q15(n: u32, d: u32) -> u32 {
+// floor(n * 2^bits / d) for n <= d, 1 <= d <= 2^31, bits <= 19 (2.2-5).
+fn divide(n: u32, d: u32, bits: u32) -> u32 {
     var remainder = n;
     var quotient = 0u;
     // 2.2-5: restoring division; the remainder stays below d, so doubling it fits 32 bits.
-    for (var step = 0u; step < 16u; step++) {
+    for (var step = 0u; step < bits + 1u; step++) {
         quotient <<= 1u;
         if (remainder >= d) {
             remainder -= d;

@@ -273,7 +273,7 @@ fn open_and_use(file: &[u8], dictionary: Option<&[u8]>) -> Option<Finding> {
             let mut random = Random::new(file.len() as u64);
             for _ in 0..4 {
                 let mut direction =
-                    || selvedge::Direction { x_q14: random.word() as i32, y_q14: random.range(-16_384, 16_384) as i32, z_q15: random.word() as i32 };
+                    || selvedge::Direction { x_q18: random.word() as i32, y_q18: random.range(-262_144, 262_144) as i32, z_q15: random.word() as i32 };
                 let (light, view) = (direction(), direction());
                 material.trilinear(random.word() >> 12, random.word(), random.word(), light, view);
                 material.point(random.word(), random.word() >> 22, random.word(), random.word() >> 22);

@@ -62,7 +62,7 @@ fn extreme_query(random: &mut Random, entry: &str, material: u32) -> Query {
     }
     let mut word = || {
         let any = random.word();
-        random.pick(&[any, any >> 17, any >> 8, 0, u32::MAX, 0x8000_0000, 0x3f80_0000, 0x7f80_0000, 16_384, 0u32.wrapping_sub(16_384)])
+        random.pick(&[any, any >> 17, any >> 8, 0, u32::MAX, 0x8000_0000, 0x3f80_0000, 0x7f80_0000, 262_144, 0u32.wrapping_sub(262_144)])
     };
     let mut three = || [word(), word(), word()];
     let (light, view, [u, v, level_q16]) = (three(), three(), three());
@@ -93,8 +93,11 @@ fn compare(gpu: &Gpu, files: &[(Vec<u8>, Vec<u8>)], samples: usize, what: &str, 
     while texels < samples {
         let material = &materials[number % materials.len()];
         let size = material.image_size(0);
-        let mut direction =
-            || Direction { x_q14: random.range(-16_384, 16_384) as i32, y_q14: random.range(-16_384, 16_384) as i32, z_q15: random.range(0, 32_768) as i32 };
+        let mut direction = || Direction {
+            x_q18: random.range(-262_144, 262_144) as i32,
+            y_q18: random.range(-262_144, 262_144) as i32,
+            z_q15: random.range(0, 32_768) as i32,
+        };
         let (light, view) = (direction(), direction());
         let query = Query { material: (number % materials.len()) as u32, light: direction_words(light), view: direction_words(view), ..Query::default() };
         let answers = gpu.image(&loaded, query, size).expect("image");

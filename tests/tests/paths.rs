@@ -9,7 +9,7 @@ use selvedge_tools::random::Random;
 use selvedge_tools::write::{write_material, write_split};
 
 fn direction(random: &mut Random) -> Direction {
-    Direction { x_q14: random.range(-16_500, 16_500) as i32, y_q14: random.range(-16_500, 16_500) as i32, z_q15: random.range(-3, 32_800) as i32 }
+    Direction { x_q18: random.range(-263_000, 263_000) as i32, y_q18: random.range(-263_000, 263_000) as i32, z_q15: random.range(-3, 32_800) as i32 }
 }
 
 fn batch_equals_plain(material: &Selvedge<'_>, random: &mut Random, count: usize) {
@@ -104,8 +104,8 @@ fn sample_directions_are_found() {
         let model = extreme_model(seed);
         let file = write_material(&model);
         let material = selvedge::open(&file, &Limits::NONE).expect("legal");
-        for (i, &[x_q14, y_q14]) in model.lights.iter().enumerate() {
-            let taps = material.locate_light(Direction { x_q14, y_q14, z_q15: 32_768 });
+        for (i, &[x, y]) in model.lights.iter().enumerate() {
+            let taps = material.locate_light(Direction { x_q18: x << 4, y_q18: y << 4, z_q15: 32_768 });
             let weight: i32 =
                 [(taps.a, taps.weight_a_q15), (taps.b, taps.weight_b_q15), (taps.c, taps.weight_c_q15)].iter().filter(|t| t.0 as usize == i).map(|t| t.1).sum();
             assert_eq!(weight, 32_768, "seed {seed} direction {i}");
@@ -124,7 +124,7 @@ fn the_place_on_the_hull_is_the_nearest() {
         let mut random = Random::new(seed);
         for _ in 0..200 {
             let asked = direction(&mut random);
-            let p = [asked.x_q14.clamp(-16_384, 16_384) as f64, asked.y_q14.clamp(-16_384, 16_384) as f64];
+            let p = [asked.x_q18, asked.y_q18].map(|c| c.clamp(-262_144, 262_144) as f64 / 16.0);
             let taps = material.locate_light(asked);
             let at = |i: u32| model.lights[i as usize].map(|c| c as f64);
             let blend: [f64; 2] = std::array::from_fn(|c| {
@@ -154,8 +154,8 @@ fn filtered_samples_meet_point_samples() {
     for light in 0..5u32 {
         for view in 0..5u32 {
             let at = |i: u32| {
-                let [x_q14, y_q14] = model.lights[i as usize];
-                Direction { x_q14, y_q14, z_q15: 32_768 }
+                let [x, y] = model.lights[i as usize];
+                Direction { x_q18: x << 4, y_q18: y << 4, z_q15: 32_768 }
             };
             let (l, v) = (material.locate_light(at(light)), material.locate_view(at(view)));
             // The centre of texel (0, 1) of 3 x 2, where the fractions of u and v are exactly representable: v.
