@@ -15,7 +15,7 @@ use crate::material::{CHANNEL_FULL, CHANNEL_MISSING, Channel};
 use crate::open::Selvedge;
 use crate::position::{Axis, Span, axis_at_position, block_count};
 use crate::records::{Table, entry, for_each_coefficient, record_of};
-use crate::result::BufferTooSmall;
+use crate::result::{BufferTooSmall, position_from_f32};
 use crate::words::{Words, high_i16, low_i16, word};
 
 /// A filtered sample to be made.
@@ -29,6 +29,14 @@ pub struct FilteredQuery {
     pub light: Direction,
     /// View direction.
     pub view: Direction,
+}
+
+impl FilteredQuery {
+    /// From a position of any magnitude, which wraps, and unit vectors in the material's tangent frame.
+    pub fn from_f32(position: [f32; 2], light: [f32; 3], view: [f32; 3]) -> FilteredQuery {
+        let [u_q32, v_q32] = position.map(position_from_f32);
+        FilteredQuery { u_q32, v_q32, light: Direction::from_unit_vector(light), view: Direction::from_unit_vector(view) }
+    }
 }
 
 /// Queries side by side.
@@ -106,16 +114,23 @@ impl Workspace<'_> {
 impl Selvedge<'_> {
     /// Words of scratch that [`Selvedge::sample_batch`] needs for `count` queries.
     pub fn batch_scratch_len(&self, count: usize) -> usize {
+        let per_query = QUERY_WORDS + 4 * (ITEM_WORDS + PART_WORDS);
+        let shared = self.ready_total() + 6 * COLUMNS + 2 * COLUMNS * LANES + self.largest_record() * COEFFICIENT_WORDS;
+        count.saturating_mul(per_query).saturating_add(self.block_total() + 1 + shared)
+    }
+
+    /// Blocks of level 0 that have records: none if no channel has texture.
+    fn block_total(&self) -> usize {
         let material = self.material();
-        let blocks = block_count(material, material.width) as usize * block_count(material, material.height) as usize;
-        count * (QUERY_WORDS + 4 * (ITEM_WORDS + PART_WORDS))
-            + blocks
-            + 1
-            + self.ready_len(material.light_start)
-            + self.ready_len(material.view_start)
-            + 6 * COLUMNS
-            + 2 * COLUMNS * LANES
-            + self.largest_record() * COEFFICIENT_WORDS
+        if material.full_count == 0 {
+            return 0;
+        }
+        (block_count(material, material.width) as usize).saturating_mul(block_count(material, material.height) as usize)
+    }
+
+    /// Words of both ready sets of directions.
+    fn ready_total(&self) -> usize {
+        self.ready_len(self.material().light_start) + self.ready_len(self.material().view_start)
     }
 
     /// Coefficients of the largest record of level 0.
@@ -128,7 +143,8 @@ impl Selvedge<'_> {
 
     /// Radiance of many filtered samples: `out[i]` equals [`Selvedge::filtered`] of `queries[i]`, bit for bit.
     ///
-    /// The more queries at once, the more of them share a block; tens of thousands are a good batch.
+    /// The more queries at once, the more of them share a block; tens of thousands are a good batch, and fewer
+    /// than 2^28 a legal one.
     ///
     /// # Errors
     /// If `out` is shorter than `queries`, or `scratch` than [`Selvedge::batch_scratch_len`].
@@ -143,7 +159,8 @@ impl Selvedge<'_> {
             return Err(BufferTooSmall { needed, lent });
         };
         self.locate_all(queries, states, ready);
-        let used = self.sort_by_block(queries, states, items, starts);
+        let textured = self.material().full_count > 0;
+        let used = if textured { self.sort_by_block(queries, states, items, starts) } else { 0 };
         textures.get_mut(..used).unwrap_or(&mut []).fill([0; PART_WORDS]);
         workspace.seen.fill(0);
         let mut mark = 0i32;
@@ -189,13 +206,11 @@ impl Selvedge<'_> {
         count: usize,
         scratch: &'s mut [i32],
     ) -> Option<(&'s mut [[i32; QUERY_WORDS]], &'s mut [[i32; ITEM_WORDS]], &'s mut [[i32; PART_WORDS]], &'s mut [i32], &'s mut [i32], Workspace<'s>)> {
-        let material = self.material();
-        let blocks = block_count(material, material.width) as usize * block_count(material, material.height) as usize;
-        let (states, rest) = scratch.split_at_mut_checked(count * QUERY_WORDS)?;
-        let (items, rest) = rest.split_at_mut_checked(count * 4 * ITEM_WORDS)?;
-        let (textures, rest) = rest.split_at_mut_checked(count * 4 * PART_WORDS)?;
-        let (starts, rest) = rest.split_at_mut_checked(blocks + 1)?;
-        let (ready, rest) = rest.split_at_mut_checked(self.ready_len(material.light_start) + self.ready_len(material.view_start))?;
+        let (states, rest) = scratch.split_at_mut_checked(count.checked_mul(QUERY_WORDS)?)?;
+        let (items, rest) = rest.split_at_mut_checked(count.checked_mul(4 * ITEM_WORDS)?)?;
+        let (textures, rest) = rest.split_at_mut_checked(count.checked_mul(4 * PART_WORDS)?)?;
+        let (starts, rest) = rest.split_at_mut_checked(self.block_total() + 1)?;
+        let (ready, rest) = rest.split_at_mut_checked(self.ready_total())?;
         let (numbers, rest) = rest.split_at_mut_checked(2 * COLUMNS)?;
         let (seen, rest) = rest.split_at_mut_checked(2 * COLUMNS)?;
         let (columns, rest) = rest.split_at_mut_checked(2 * COLUMNS)?;

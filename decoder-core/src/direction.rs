@@ -99,6 +99,13 @@ pub fn single_tap(index: u32) -> Taps {
     Taps { a: index, b: index, c: index, weight_a_q15: ONE_Q15, weight_b_q15: 0, weight_c_q15: 0, cosine_q15: ONE_Q15 }
 }
 
+/// A sample direction as a query (5.1-4).
+pub fn sample_direction(words: Words<'_>, start: u32, index: u32) -> Direction {
+    let pair = point(words, start, index);
+    // 5.1-4: the same point with four zero bits, and its cosine.
+    Direction { x_q18: low_i16(pair) << 4, y_q18: high_i16(pair) << 4, z_q15: point_z_q15(words, start, index) }
+}
+
 /// First word of the sample directions of the set at `start` (5.3).
 pub fn points_start(start: u32) -> u32 {
     start.wrapping_add(8)

@@ -10,6 +10,9 @@ use crate::direction::{cross, dot_product, grid_cell, grid_start, hull_start, po
 use crate::error::Rule;
 use crate::words::{high_i16, low_i16, word};
 
+/// Most triangles that a cell lists (5.5-5).
+pub const CELL_LIMIT: u32 = 256;
+
 /// A point in Q14.
 type Point = (i32, i32);
 
@@ -221,6 +224,9 @@ fn check_grid(check: &mut Check<'_, '_>, set: &Set) -> bool {
             _ => from >= before && from <= set.candidate_count,
         };
         if !check.ensure(holds, Rule::GridStarts, set.byte(set.grid + cell), from) {
+            return false;
+        }
+        if !check.ensure(from - before <= CELL_LIMIT, Rule::GridCell, set.byte(set.grid + cell), from - before) {
             return false;
         }
         before = from;

@@ -321,6 +321,11 @@ fn check_record(check: &mut Check<'_, '_>, stream: &Stream<'_>, bit: u32, stream
         return None;
     }
     let (sum, end) = (scan.sum, scan.end);
+    // Zeros cost time and no multiplication, so their number is bounded by that of the coefficients.
+    let zeros = end - highs as u32 - count;
+    if !check.ensure(zeros <= 32 * count + 32, Rule::RecordZeros, at, zeros) {
+        return None;
+    }
     check.ensure(sum <= SUM_LIMIT, Rule::RecordSum, at, sum);
     if check.stopped { None } else { Some((end, count)) }
 }

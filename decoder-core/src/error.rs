@@ -75,6 +75,7 @@ rules! {
     DictionaryHeader "3.1-19" Invalid "a dictionary's header states nothing of an image";
     LimitBytes "4.1-1" Limits "the file is not longer than the caller allows";
     LimitOperations "4.1-2" Limits "a sample does not cost more operations than the caller allows";
+    LimitTexels "4.1-4" Limits "the image does not have more texels than the caller allows";
     SectionKind "3.2-1" Unsupported "a section is of a known kind or optional";
     SectionOrder "3.2-2" Invalid "entries ascend by kind, then instance";
     SectionOffset "3.2-3" Invalid "a section begins at the first multiple of 16 after the one before";
@@ -86,7 +87,7 @@ rules! {
     SectionForeign "3.3-2" Invalid "no known section is there that the header does not call for";
     MetadataLength "3.4-1" Invalid "the metadata hold eight words and three strings and nothing more";
     MetadataValue "3.4-2" Invalid "metadata codes are defined and reserved words zero";
-    MetadataText "3.4-3" Invalid "metadata strings are UTF-8 without control characters, padded with zero";
+    MetadataText "3.4-3" Invalid "metadata strings are UTF-8 without control or invisible characters, padded with zero";
     ExternalLength "3.5-1" Invalid "the reference to a dictionary has 48 bytes, its last 12 zero";
     ExternalMissing "3.5-2" Usage "a material with an external dictionary is opened with it";
     ExternalUnwanted "3.5-3" Usage "a material without an external dictionary is opened without one";
@@ -100,6 +101,7 @@ rules! {
     TriangleReciprocal "5.4-4" Invalid "shift and reciprocal are those of the area";
     TriangleOrder "5.4-5" Invalid "triangles ascend";
     GridStarts "5.5-2" Invalid "the grid's starts ascend from zero to the count of candidates";
+    GridCell "5.5-5" Invalid "a cell lists at most 256 triangles";
     GridCandidate "5.5-3" Invalid "a cell lists, ascending, the triangles that meet it";
     GridComplete "5.5-4" Invalid "a cell lists every triangle that meets it";
     HullEdge "5.7-6" Invalid "a hull edge has two directions and the reciprocal of its length squared";
@@ -123,6 +125,7 @@ rules! {
     RecordPlace "10.4-6" Invalid "records follow each other without a gap and end with the stream";
     RecordHeader "10.4-7" Invalid "dictionary, shift and low bits of a record are in range, zero if it is empty";
     RecordPositions "10.4-8" Invalid "positions ascend and name atoms of the dictionary";
+    RecordZeros "10.4-11" Invalid "the high parts of a record have at most 32 zeros for each coefficient, and 32";
     RecordSum "10.7-7" Invalid "the shifted magnitudes of a record sum to at most 65,535";
     StreamEnd "10.4-9" Invalid "bits after the last record are zero";
     LargestCount "10.3-4" Invalid "the stated largest count is that of the records";

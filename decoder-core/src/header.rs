@@ -114,7 +114,7 @@ pub(crate) fn check_header(check: &mut Check<'_, '_>, limits: &Limits) -> Option
     if !check.ensure(major == MAJOR_VERSION, Rule::MajorVersion, 8, major) {
         return None;
     }
-    let whole = header.file_length == length && length % 16 == 0 && check.bytes.len() <= 0xffff_fff0;
+    let whole = header.file_length == length && length % 16 == 0 && check.bytes.len() as u64 <= 0xffff_fff0;
     check.ensure(whole, Rule::FileLength, 12, header.file_length);
     // At most 128 + 16 * 4096 bytes: no overflow.
     let directory_end = HEADER_LENGTH.wrapping_add(ENTRY_LENGTH.wrapping_mul(header.section_count.min(4096)));
@@ -183,5 +183,8 @@ pub(crate) fn check_header(check: &mut Check<'_, '_>, limits: &Limits) -> Option
     // 4.1: the price is compared before anything beyond the directory is touched.
     let affordable = check.ensure(length <= limits.bytes, Rule::LimitBytes, 12, length)
         & check.ensure(header.operations <= limits.operations, Rule::LimitOperations, 28, header.operations);
+    // At most 2^28 where the sizes are sound.
+    let texels = header.width.saturating_mul(header.height);
+    let affordable = affordable & check.ensure(texels <= limits.texels, Rule::LimitTexels, 32, texels);
     (sound && affordable && !check.stopped).then_some(header)
 }

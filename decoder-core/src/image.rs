@@ -184,7 +184,9 @@ impl Selvedge<'_> {
     #[inline(always)]
     fn add_record(&self, channel: Channel, record: &Record, products: &[i32], sums: &mut [Lanes; LANES]) {
         let words = self.words();
-        let first: usize = (0..record.dictionary).map(|k| atoms_of(words, channel, k).len()).sum();
+        // Lists follow each other (10.5-4), so the words between two are two an atom.
+        let list = |k: u32| word(words, channel.atoms_start.wrapping_add(3).wrapping_add(k.wrapping_mul(2)));
+        let first = (list(record.dictionary).wrapping_sub(list(0)) >> 1) as usize;
         let products = products.get(first..).unwrap_or(&[]);
         let x_table = Table::new(words, channel.spatial_start, record.dictionary, 0);
         let y_table = Table::new(words, channel.spatial_start, record.dictionary, 1);

@@ -76,6 +76,8 @@ mod sha256;
 mod stream;
 pub mod words;
 
+#[cfg(feature = "batch")]
+pub use batch::FilteredQuery;
 pub use check::Section;
 pub use colour::{Rgb, Values};
 pub use crc32::crc32;
@@ -86,5 +88,5 @@ pub use limits::Limits;
 pub use material::Material;
 pub use metadata::Metadata;
 pub use open::{Selvedge, open, open_with, validate};
-pub use result::BufferTooSmall;
+pub use result::{BufferTooSmall, position_from_f32};
 pub use sha256::{Digest, Sha256, sha256};

@@ -83,6 +83,35 @@ pub struct Material {
 /// Words in a [`Material`].
 pub const MATERIAL_WORDS: usize = 48;
 
+impl Material {
+    /// The record's words in the order of its fields, for a kernel's table of materials.
+    pub fn to_words(&self) -> [u32; MATERIAL_WORDS] {
+        let Material { matrix_q13: m, channels, .. } = *self;
+        let [c0, c1, c2] = channels.map(|c| [c.state, c.mean_start, c.scale_start, c.full_rank, c.angular_start, c.spatial_start, c.atoms_start]);
+        let head = [
+            self.file_start,
+            self.width,
+            self.height,
+            self.level_count,
+            self.light_count,
+            self.view_count,
+            self.light_start,
+            self.view_start,
+            self.transfer,
+            self.cosine_included,
+            self.offset_mantissa_q31,
+            self.exponent as u32,
+        ];
+        let tail = [self.edge, self.edge_reciprocal_q18, self.layer_count, self.layer_limit, self.full_count, self.coefficient_entry];
+        let mut words = [0; MATERIAL_WORDS];
+        let fields = head.into_iter().chain(m.map(|entry| entry as u32)).chain(tail).chain(c0).chain(c1).chain(c2);
+        words.iter_mut().zip(fields).for_each(|(word, field)| *word = field);
+        words
+    }
+}
+
+const _: () = assert!(size_of::<Material>() == MATERIAL_WORDS * 4, "every field is one word");
+
 /// Texels along an axis of `size` texels at `level`: its share of the size, rounded up (9.1-1).
 pub fn level_size(size: u32, level: u32) -> u32 {
     // 9.1-1: never zero, since sizes are at least one.

@@ -36,9 +36,14 @@ fn read_text(bytes: &[u8], at: usize) -> Option<(&[u8], &[u8], usize)> {
     Some((bytes.get(start..end)?, bytes.get(end..next)?, next))
 }
 
-/// A string without control characters.
+/// Characters that are not seen, or that change how others are read (3.4-3).
+fn is_invisible(c: char) -> bool {
+    c.is_control() || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')
+}
+
+/// A string that can be shown as it is.
 fn as_plain_text(text: &[u8]) -> Option<&str> {
-    core::str::from_utf8(text).ok().filter(|text| !text.chars().any(|c| c.is_control()))
+    core::str::from_utf8(text).ok().filter(|text| !text.chars().any(is_invisible))
 }
 
 /// The metadata of a section that was checked.

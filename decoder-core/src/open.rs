@@ -3,7 +3,7 @@
 use crate::check::{Check, Section};
 use crate::colour::{Rgb, Values};
 use crate::cost::{Shape, filtered_operations};
-use crate::direction::{Direction, Taps};
+use crate::direction::{Direction, Taps, sample_direction};
 use crate::direction_set::{check_directions, largest_candidates};
 use crate::directory::{DIRECTIONS, EXTERNAL, MEANS, METADATA, SCALES, SPATIAL, check_directory, find_in, find_section, read_entry};
 #[cfg(feature = "sparse-ensemble")]
@@ -147,7 +147,9 @@ fn walk_external(check: &mut Check<'_, '_>, header: &Header, dictionary: Option<
         check.find(Rule::ExternalMissing, section.offset, stated_length);
         return None;
     };
-    check.ensure(stated_length <= limits.bytes, Rule::LimitBytes, section.offset + 32, stated_length);
+    if !check.ensure(stated_length <= limits.bytes, Rule::LimitBytes, section.offset + 32, stated_length) {
+        return None;
+    }
     let same = dictionary.len() == stated_length as usize && sha256(dictionary) == digest;
     if !check.ensure(same, Rule::ExternalDigest, section.offset, dictionary.len() as u32) {
         return None;
@@ -223,16 +225,18 @@ impl<'a> Selvedge<'a> {
         (0..self.header.section_count).map(|index| read_entry(|offset| word(self.words, offset >> 2), index))
     }
 
-    /// The same material, decoded only up to a quality layer: 1 for the first alone.
+    /// The same material, decoded only up to a quality layer: 1 for the first alone. Its digest is then that of the layers.
     pub fn with_layers(mut self, layers: u32) -> Self {
         self.material.layer_limit = layers.clamp(1, self.header.layer_count);
         self
     }
 
     /// The record for a kernel whose buffer holds this file from word `file_start` on, and the external
-    /// dictionary, if there is one, from word `dictionary_start` on.
+    /// dictionary, if there is one, from word `dictionary_start` on. Buffers end before word 2^31.
     pub fn material_at(&self, file_start: u32, dictionary_start: u32) -> Material {
-        let place = |start: u32| if start < crate::words::DICTIONARY_START { start + file_start } else { (start & 0x7fff_ffff) + dictionary_start };
+        let place = |start: u32| {
+            if start < crate::words::DICTIONARY_START { start.wrapping_add(file_start) } else { (start & 0x7fff_ffff).wrapping_add(dictionary_start) }
+        };
         let mut material = self.material;
         material.file_start = file_start;
         material.light_start = place(material.light_start);
@@ -247,6 +251,18 @@ impl<'a> Selvedge<'a> {
             }
         }
         material
+    }
+
+    /// Sample direction `index` of the light, as a query; an index beyond the end is moved to the last.
+    pub fn light_direction(&self, index: u32) -> Direction {
+        let last = self.material.light_count.wrapping_sub(1);
+        sample_direction(self.words, self.material.light_start, index.min(last))
+    }
+
+    /// Sample direction `index` of the view, as a query; an index beyond the end is moved to the last.
+    pub fn view_direction(&self, index: u32) -> Direction {
+        let last = self.material.view_count.wrapping_sub(1);
+        sample_direction(self.words, self.material.view_start, index.min(last))
     }
 
     /// The taps of a light direction; reuse them for many texels.

@@ -59,12 +59,14 @@ pub fn next_query_word(state: &mut u32) -> u32 {
     *state
 }
 
-/// A direction of the query sequence (11.2-3): any point of the square, any cosine.
+/// A direction of the query sequence (11.2-3): any point of the square, any cosine, half of them above one.
 fn next_query_direction(state: &mut u32) -> Direction {
-    let word = next_query_word(state);
-    let x_q18 = (((word & 0xffff) << 3) as i32).wrapping_sub(262_144);
-    let y_q18 = (((word >> 16) << 3) as i32).wrapping_sub(262_144);
-    let z_q15 = (next_query_word(state) & 0x7fff) as i32;
+    let first = next_query_word(state);
+    let second = next_query_word(state);
+    let x_q18 = ((first & 0xffff) << 3 | (second >> 16) & 7) as i32;
+    let y_q18 = ((first >> 16) << 3 | (second >> 19) & 7) as i32;
+    let (x_q18, y_q18) = (x_q18.wrapping_sub(262_144), y_q18.wrapping_sub(262_144));
+    let z_q15 = (second & 0xffff) as i32;
     Direction { x_q18, y_q18, z_q15 }
 }
 

@@ -4,8 +4,7 @@
 //!
 //! With `SELVEDGE_DATA` the full 400 x 400 material is measured, without it the excerpt in the repository.
 
-use selvedge::batch::FilteredQuery;
-use selvedge::{Direction, Limits, Rgb, Selvedge};
+use selvedge::{Direction, FilteredQuery, Limits, Rgb, Selvedge};
 use selvedge_tools::random::Random;
 use selvedge_tools::{sparsebtf, write};
 use std::hint::black_box;

@@ -3,6 +3,7 @@
 
 use crate::error::{Result, ToolError};
 use crate::picture::{Picture, false_colour};
+#[cfg(feature = "gpu")]
 use crate::random::Random;
 use crate::sparsebtf::{AuthorsMaterial, read_material};
 use crate::{files, inspect, write};

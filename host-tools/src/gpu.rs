@@ -155,7 +155,7 @@ impl Gpu {
             files.extend(words.file);
             let dictionary_start = files.len() / 4;
             files.extend(words.dictionary);
-            records.extend(material_words(&material.material_at(file_start as u32, dictionary_start as u32)));
+            records.extend(material.material_at(file_start as u32, dictionary_start as u32).to_words());
         }
         // One word past the end may be read by a window.
         files.extend([0; 16]);
@@ -228,28 +228,4 @@ impl Gpu {
     pub fn image(&self, loaded: &Loaded, query: Query, size: [u32; 2]) -> Result<Vec<Answer>> {
         self.run(loaded, "image", &[query], (size[0] * size[1]) as usize, size.map(|s| s.div_ceil(8)))
     }
-}
-
-/// The 48 words of a material's record, in the order of the struct.
-pub fn material_words(m: &selvedge::Material) -> Vec<u32> {
-    let mut words = vec![
-        m.file_start,
-        m.width,
-        m.height,
-        m.level_count,
-        m.light_count,
-        m.view_count,
-        m.light_start,
-        m.view_start,
-        m.transfer,
-        m.cosine_included,
-        m.offset_mantissa_q31,
-        m.exponent as u32,
-    ];
-    words.extend(m.matrix_q13.map(|entry| entry as u32));
-    words.extend([m.edge, m.edge_reciprocal_q18, m.layer_count, m.layer_limit, m.full_count, m.coefficient_entry]);
-    for c in m.channels {
-        words.extend([c.state, c.mean_start, c.scale_start, c.full_rank, c.angular_start, c.spatial_start, c.atoms_start]);
-    }
-    words
 }

@@ -118,11 +118,14 @@ struct LimitArgs {
     /// Refuse files whose samples cost more operations
     #[arg(long, default_value_t = Limits::default().operations)]
     max_operations: u32,
+    /// Refuse images of more texels
+    #[arg(long, default_value_t = Limits::default().texels)]
+    max_texels: u32,
 }
 
 impl LimitArgs {
     fn limits(&self) -> Limits {
-        Limits { bytes: self.max_bytes, operations: self.max_operations }
+        Limits { bytes: self.max_bytes, operations: self.max_operations, texels: self.max_texels }
     }
 }
 

@@ -8,7 +8,7 @@
 //! | binding | type | holds |
 //! |---|---|---|
 //! | 0 | `storage, read` `array<u32>` | the files, and external dictionaries, each from a word of its own on |
-//! | 1 | `storage, read` `array<Material>` | a record of 48 words for each material: `Selvedge::material_at` |
+//! | 1 | `storage, read` `array<Material>` | a record of 48 words for each material: `Selvedge::material_at`, then `Material::to_words` |
 //! | 2 | `storage, read` `array<Query>` | 10 words for each question (entry points only) |
 //! | 3 | `storage, read_write` `array<Answer>` | 6 words for each answer (entry points only) |
 //!

@@ -85,6 +85,13 @@ fn single_tap(index: u32) -> Taps {
     return Taps(index, index, index, ONE_Q15, 0, 0, ONE_Q15);
 }
 
+// A sample direction as a query (5.1-4).
+fn sample_direction(start: u32, index: u32) -> Direction {
+    let pair = point(start, index);
+    // 5.1-4: the same point with four zero bits, and its cosine.
+    return Direction(low_i16(pair) << 4u, high_i16(pair) << 4u, point_z_q15(start, index));
+}
+
 // First word of the sample directions of the set at `start` (5.3).
 fn points_start(start: u32) -> u32 {
     return start + 8u;

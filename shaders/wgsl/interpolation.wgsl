@@ -103,9 +103,11 @@ fn level_values(material: Material, level: u32, x: Axis, y: Axis, light: Taps, v
 
 // Values between two texels of each axis of one level (8.4).
 fn filtered_values(material: Material, level: u32, u_q32: u32, v_q32: u32, light: Taps, view: Taps) -> Values {
-    let x = axis_at_position(material.edge, material.edge_reciprocal_q18, level_size(material.width, level), u_q32);
-    let y = axis_at_position(material.edge, material.edge_reciprocal_q18, level_size(material.height, level), v_q32);
-    return level_values(material, level, x, y, light, view);
+    // 8.4-4: a level beyond the last is the last.
+    let inside = min(level, material.level_count - 1u);
+    let x = axis_at_position(material.edge, material.edge_reciprocal_q18, level_size(material.width, inside), u_q32);
+    let y = axis_at_position(material.edge, material.edge_reciprocal_q18, level_size(material.height, inside), v_q32);
+    return level_values(material, inside, x, y, light, view);
 }
 
 // Part of the way from one value to another (9.2-3).

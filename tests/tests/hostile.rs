@@ -5,8 +5,9 @@ use selvedge::{Finding, First, Limits, Rule};
 use selvedge_tests::setting;
 use selvedge_tools::example::example_model;
 use selvedge_tools::extreme::extreme_model;
+use selvedge_tools::model::{AtomModel, FactorModel};
 use selvedge_tools::random::Random;
-use selvedge_tools::triangulate::with_grid;
+use selvedge_tools::triangulate::{triangulate, with_grid};
 use selvedge_tools::write::{
     Part, directions_part, lay_out, repair_checksums, repair_header_checksum, take_apart, words_to_bytes, write_material, write_split,
 };
@@ -181,6 +182,9 @@ fn cases() -> Vec<Case> {
         }),
         Case { limits: Limits { bytes: 100, ..Limits::NONE }, ..Case::new(Rule::LimitBytes, good.clone(), Some(12)) },
         Case { limits: Limits { operations: 10, ..Limits::NONE }, ..Case::new(Rule::LimitOperations, good.clone(), Some(28)) },
+        Case { limits: Limits { texels: 5, ..Limits::NONE }, ..Case::new(Rule::LimitTexels, good.clone(), Some(32)) },
+        crowded_cell(),
+        many_zeros(),
         Case::new(Rule::ExternalMissing, split.clone(), None),
         Case { dictionary: Some(dictionary.clone()), ..Case::new(Rule::ExternalUnwanted, good.clone(), None) },
     ];
@@ -221,6 +225,36 @@ fn cases() -> Vec<Case> {
     cases
 }
 
+/// A set of directions whose one cell lists all of its 288 triangles.
+fn crowded_cell() -> Case {
+    let mut model = example_model();
+    model.lights = (0..169).map(|i| [i % 13 * 900 - 5000, i / 13 * 900 - 5000]).collect();
+    let sparse = triangulate(&model.lights, None);
+    let crowded = with_grid(&model.lights, sparse.triangles, sparse.hull, 1);
+    let (header, mut parts) = take_apart(&write_material(&model));
+    parts.iter_mut().find(|p| p.kind == 3).expect("there").bytes = directions_part(0, &model.lights, &crowded).bytes;
+    Case::new(Rule::GridCell, lay_out(header, parts), None)
+}
+
+/// A record of one coefficient whose position is written as 99 zeros and a one.
+fn many_zeros() -> Case {
+    let mut model = example_model();
+    let ensemble = model.channels[0].ensemble.as_mut().expect("full");
+    ensemble.dictionaries[0].view = FactorModel { columns: 100, entries: vec![1; 500] };
+    ensemble.atoms[0] = (0..100).map(|view| AtomModel { view, step: 9, ..AtomModel::default() }).collect();
+    ensemble.coefficients[0][0].records.iter_mut().for_each(|record| record.coefficients = vec![(99, 0)]);
+    let (header, mut parts) = take_apart(&write_material(&model));
+    // Count 1, shift 5 + 3, no low bits, a value of four bits: 14 bits, then the high part.
+    let record = 1u128 | 3 << 1 | 1 << (14 + 99);
+    let words = [4 | 1 << 16, 2, 228, 1, 0, 114];
+    let stream: Vec<u8> = (0..2).fold(vec![0u8; 32], |mut stream, i| {
+        (0..114).filter(|bit| record >> bit & 1 == 1).for_each(|bit| stream[(i * 114 + bit) / 8] |= 1 << ((i * 114 + bit) % 8));
+        stream
+    });
+    parts.iter_mut().find(|p| p.kind == 0x113).expect("there").bytes = [words_to_bytes(&words), stream].concat();
+    Case::new(Rule::RecordZeros, lay_out(header, parts), None)
+}
+
 /// The example with tables for three directions.
 fn shrink(mut model: selvedge_tools::model::MaterialModel) -> selvedge_tools::model::MaterialModel {
     for channel in &mut model.channels {
@@ -259,7 +293,7 @@ fn every_rule_can_be_broken() {
 
 /// What every answer to a file must be: an error inside the file, or a material that answers.
 fn open_and_use(file: &[u8], dictionary: Option<&[u8]>) -> Option<Finding> {
-    let limits = Limits { bytes: 1 << 24, operations: 1 << 24 };
+    let limits = Limits { bytes: 1 << 24, operations: 1 << 24, texels: 1 << 20 };
     match selvedge::open_with(file, dictionary, &limits) {
         Err(finding) => {
             let part = if finding.part == selvedge::Part::File { file } else { dictionary.unwrap_or(&[]) };

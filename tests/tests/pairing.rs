@@ -89,7 +89,7 @@ fn rust_side(module: &str) -> Side {
                 let fields = item.fields.iter().map(|field| (field.ident.as_ref().expect("named").to_string(), rust_type(&field.ty)));
                 side.structs.insert(item.ident.to_string(), fields.collect());
             }
-            syn::Item::Const(item) if !is_one_sided(module, &item.ident.to_string()) => {
+            syn::Item::Const(item) if item.ident != "_" && !is_one_sided(module, &item.ident.to_string()) => {
                 side.constants.insert(item.ident.to_string(), literal(&item.expr));
             }
             _ => {}
@@ -195,7 +195,7 @@ fn a_material_is_its_words() {
         .filter_map(|(n, _)| n.parse::<i64>().ok().map(|n| n as u32))
         .collect();
     // Names with digits of their own (q13, q18, q31) add numbers; without them the two lists are equal.
-    let words = selvedge_tools::gpu::material_words(opened.material());
+    let words = opened.material().to_words();
     let mut rest = numbers.iter();
     assert!(words.iter().all(|word| rest.any(|n| n == word)), "{debug}\n{words:?}");
     assert_eq!(words.len(), selvedge::material::MATERIAL_WORDS);

@@ -105,7 +105,9 @@ fn sample_directions_are_found() {
         let file = write_material(&model);
         let material = selvedge::open(&file, &Limits::NONE).expect("legal");
         for (i, &[x, y]) in model.lights.iter().enumerate() {
-            let taps = material.locate_light(Direction { x_q18: x << 4, y_q18: y << 4, z_q15: 32_768 });
+            let asked = material.light_direction(i as u32);
+            assert_eq!([asked.x_q18, asked.y_q18], [x << 4, y << 4]);
+            let taps = material.locate_light(asked);
             let weight: i32 =
                 [(taps.a, taps.weight_a_q15), (taps.b, taps.weight_b_q15), (taps.c, taps.weight_c_q15)].iter().filter(|t| t.0 as usize == i).map(|t| t.1).sum();
             assert_eq!(weight, 32_768, "seed {seed} direction {i}");
