@@ -34,22 +34,42 @@ const fn tables() -> [[u32; 256]; STRIDE] {
 
 static TABLES: [[u32; 256]; STRIDE] = tables();
 
+/// Entry of a table by the lowest byte of a word.
+#[inline(always)]
+fn at(table: usize, word: u32) -> u32 {
+    TABLES[table & (STRIDE - 1)][(word & 0xff) as usize]
+}
+
+/// What the four bytes of a word add, the last of them `table` bytes before the end of a stride.
+#[cfg(feature = "batch")]
+#[inline(always)]
+fn at_word(table: usize, word: u32) -> u32 {
+    (at(table.wrapping_add(3), word) ^ at(table.wrapping_add(2), word >> 8)) ^ (at(table.wrapping_add(1), word >> 16) ^ at(table, word >> 24))
+}
+
+/// Strides of sixteen bytes: the checksum so far meets the first word, the others wait for nothing.
+#[cfg(feature = "batch")]
+fn strides(mut crc: u32, bytes: &[u8]) -> (u32, &[u8]) {
+    let (chunks, rest) = bytes.as_chunks::<STRIDE>();
+    for &[a0, a1, a2, a3, b0, b1, b2, b3, c0, c1, c2, c3, d0, d1, d2, d3] in chunks {
+        let behind = at_word(8, u32::from_le_bytes([b0, b1, b2, b3])) ^ at_word(4, u32::from_le_bytes([c0, c1, c2, c3]));
+        let behind = behind ^ at_word(0, u32::from_le_bytes([d0, d1, d2, d3]));
+        crc = at_word(12, crc ^ u32::from_le_bytes([a0, a1, a2, a3])) ^ behind;
+    }
+    (crc, rest)
+}
+
+/// No strides: one byte at a time.
+#[cfg(not(feature = "batch"))]
+fn strides(crc: u32, bytes: &[u8]) -> (u32, &[u8]) {
+    (crc, bytes)
+}
+
 /// CRC-32 of `bytes`, continued from the checksum of what precedes them (0 for nothing).
 pub fn crc32(before: u32, bytes: &[u8]) -> u32 {
-    let mut crc = !before;
-    let at = |table: usize, byte: u8| TABLES[table & (STRIDE - 1)][byte as usize];
-    let (chunks, rest) = bytes.as_chunks::<STRIDE>();
-    for chunk in chunks {
-        // The checksum so far meets the first four bytes, or as many as there are.
-        let mut next = crc.checked_shr(8 * STRIDE as u32).unwrap_or(0);
-        for (i, byte) in chunk.iter().enumerate() {
-            let met = if i < 4 { byte ^ (crc >> (8 * i)) as u8 } else { *byte };
-            next ^= at(STRIDE - 1 - i, met);
-        }
-        crc = next;
-    }
+    let (mut crc, rest) = strides(!before, bytes);
     for &byte in rest {
-        crc = (crc >> 8) ^ at(0, byte ^ crc as u8);
+        crc = (crc >> 8) ^ at(0, crc ^ byte as u32);
     }
     !crc
 }

@@ -365,8 +365,8 @@ fn scan_record(bytes: &[u8], list: &[[u8; 8]], layout: Layout) -> Scan {
     let mut field_bit = fields;
     let mut ones = Ones::new(bytes, highs, end);
     // Locals, not fields of the result, so that they stay in registers.
-    let (mut count_so_far, mut last, mut sum, mut ascends, mut beyond) = (0u32, highs, 0i32, true, None);
-    let mut next = 0u64;
+    let (mut count_so_far, mut last, mut sum, mut order, mut beyond) = (0u32, highs, 0i32, 0i64, None);
+    let mut next = 0i64;
     while count_so_far < count {
         let Some(place) = ones.next() else { break };
         last = place + 1;
@@ -379,8 +379,9 @@ fn scan_record(bytes: &[u8], list: &[[u8; 8]], layout: Layout) -> Scan {
             beyond = Some(position as u32);
             break;
         };
-        ascends &= position >= next;
-        next = position + 1;
+        // Negative if a position does not ascend; looked at once, at the end.
+        order |= position as i64 - next;
+        next = position as i64 + 1;
         let step = u16::from_le_bytes([s0, s1]) as u32;
         let value = (field >> low_bits) & value_mask;
         let coefficient = i16::from_le_bytes([b0, b1]) as i32 + ((value * step + half) >> value_bits) as i32;
@@ -389,5 +390,5 @@ fn scan_record(bytes: &[u8], list: &[[u8; 8]], layout: Layout) -> Scan {
         sum -= negative >> (a & 0xf);
         count_so_far += 1;
     }
-    Scan { count: count_so_far, end: last, sum: sum as u32, ascends, beyond }
+    Scan { count: count_so_far, end: last, sum: sum as u32, ascends: order >= 0, beyond }
 }
