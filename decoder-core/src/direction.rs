@@ -15,7 +15,8 @@ pub const ONE_Q18: i32 = 262_144;
 /// One in Q30.
 pub const ONE_Q30: i32 = 0x4000_0000;
 
-/// A direction of the upper hemisphere, or below it with a zero cosine.
+/// A direction of the upper hemisphere, or below it with a zero cosine. The default is one without light: the
+/// point of the normal, with a cosine of zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
 pub struct Direction {

@@ -1,7 +1,7 @@
 //! Fixed-point arithmetic (chapter 2). Twin: `shaders/wgsl/fixed.wgsl`.
 //!
 //! Everything that decides a bit of a result is here or built from what is here: 32-bit integers that
-//! wrap, shifts, comparisons. Nothing divides and nothing is a float, so every machine agrees.
+//! wrap, shifts, comparisons. There is no division instruction and no float, so every machine agrees.
 
 /// One in Q15.
 pub const ONE_Q15: i32 = 32768;
@@ -25,7 +25,7 @@ pub const EXP2_C6: u32 = 0x000e_2a0c;
 /// The largest finite binary32.
 pub const BINARY32_MAX: u32 = 0x7f7f_ffff;
 
-/// `floor((p * u + 2^14) / 2^15)`, for `|u| <= 2^15`, and below it if `p` is -2^31 (2.2-1).
+/// `floor((p * u + 2^14) / 2^15)`, for `|u| <= 2^15`; if `p` is -2^31, `u` is above -2^15 (2.2-1).
 ///
 /// Never larger in magnitude than `p`. The product has up to 47 bits; the two limbs of `p` keep each
 /// partial product within 32.

@@ -42,7 +42,7 @@ impl Selvedge<'_> {
 
     /// Channel values, Q20, of every texel of a level: `[height, width]`, row-major.
     ///
-    /// Each value equals that of [`Selvedge::point_values`] where the directions are sample directions.
+    /// At level 0 each value equals that of [`Selvedge::point_values`] where the directions are sample directions.
     /// Levels and channels beyond the last are the last.
     ///
     /// # Errors

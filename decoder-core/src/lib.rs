@@ -30,8 +30,9 @@
 //! | 6 position | [`position`]* |
 //! | 7 colour | [`colour`]* |
 //! | 8, 9 interpolation, levels | [`interpolation`]*, [`pair_table`] |
-//! | 10 sparse ensemble | [`ensemble`]*, [`ensemble_set`] |
+//! | 10 sparse ensemble | `ensemble`*, `ensemble_set` |
 //! | 11 results and digest | [`result`] |
+//! | all of them together | `open`, and the fast paths `batch` and `image` |
 
 #![no_std]
 #![forbid(unsafe_code)]

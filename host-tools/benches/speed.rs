@@ -4,7 +4,7 @@
 //!
 //! With `SELVEDGE_DATA` the full 400 x 400 material is measured, without it the excerpt in the repository.
 
-use selvedge::{Direction, FilteredQuery, Limits, Rgb, Selvedge};
+use selvedge::{Direction, FilteredQuery, Limits, Rgb};
 use selvedge_tools::model::MaterialModel;
 use selvedge_tools::random::Random;
 use selvedge_tools::{sparsebtf, write};

@@ -17,10 +17,22 @@ pub fn read(path: &Path) -> Result<Vec<u8>> {
 /// Writes beside the file, then renames: nobody ever sees half of it. `-` is standard output.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     if path == Path::new("-") {
-        return std::io::stdout().write_all(bytes).map_err(ToolError::io(path));
+        let mut out = std::io::stdout().lock();
+        return match out.write_all(bytes).and_then(|()| out.flush()) {
+            // Whoever reads has had enough.
+            Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+            result => result.map_err(ToolError::io(path)),
+        };
     }
+    // A device, a pipe or a link stays what it is.
+    let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    if std::fs::metadata(&target).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
+        let mut open = std::fs::OpenOptions::new().write(true).open(&target).map_err(ToolError::io(path))?;
+        return open.write_all(bytes).map_err(ToolError::io(path));
+    }
+    let path = target.as_path();
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut beside = tempfile::Builder::new().prefix(".selvedge-").tempfile_in(folder).map_err(ToolError::io(path))?;
+    let mut beside = tempfile::Builder::new().prefix(".selvedge-").tempfile_in(folder).map_err(|error| ToolError::io(path)(error.kind().into()))?;
     beside.write_all(bytes).and_then(|()| beside.as_file().sync_all()).map_err(ToolError::io(path))?;
     // A temporary file is private; a result has the permissions that a new file would have.
     #[cfg(unix)]

@@ -102,6 +102,14 @@ pub struct Loaded {
 }
 
 impl Gpu {
+    /// The best adapter there is: a native one, else GL, else `None`.
+    pub fn any() -> Result<Option<Gpu>> {
+        match Gpu::new(wgpu::Backends::PRIMARY)? {
+            Some(gpu) => Ok(Some(gpu)),
+            None => Gpu::new(wgpu::Backends::GL),
+        }
+    }
+
     /// The first adapter of the backends; `None` if there is none. A software adapter will do.
     pub fn new(backends: wgpu::Backends) -> Result<Option<Gpu>> {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();

@@ -80,6 +80,19 @@ pub fn validate(name: &str, bytes: &[u8], dictionary: Option<&[u8]>, limits: &Li
     report
 }
 
+/// The same for people: a line a finding, nothing where all is well.
+pub fn validation_text(report: &Validation) -> String {
+    let mut text = String::new();
+    for f in &report.findings {
+        let part = if f.part == "dictionary" { " (dictionary)" } else { "" };
+        text += &format!("{}{part}: {} at byte {}: {}; found {} ({:#x})\n", report.file, f.rule, f.offset, f.title, f.found, f.found);
+    }
+    if report.count > report.findings.len() {
+        text += &format!("{}: {} findings in all\n", report.file, report.count);
+    }
+    text
+}
+
 /// A section, as JSON.
 #[derive(Clone, Debug, Serialize)]
 pub struct SectionReport {

@@ -87,7 +87,7 @@ enum Command {
         #[arg(long)]
         layers: Option<u32>,
         /// Factor for .png; .exr has the decoder's bits
-        #[arg(long, default_value_t = 1.0)]
+        #[arg(long, default_value_t = 1.0, value_parser = parse_exposure, allow_negative_numbers = true)]
         exposure: f32,
     },
     /// Write the decoder's kernel as WGSL, SPIR-V, MSL, HLSL and GLSL, with its bindings
@@ -139,21 +139,53 @@ fn parse_angles(text: &str) -> std::result::Result<Direction, String> {
     let Some(Ok([polar, azimuth])) = parts.map(<[f64; 2]>::try_from) else {
         return Err("two numbers, as 30,90".into());
     };
+    if !(0.0..=90.0).contains(&polar) {
+        return Err("the angle from the normal is 0 to 90 degrees".into());
+    }
     let (polar, azimuth) = (polar.to_radians(), azimuth.to_radians());
     Ok(Direction::from_unit_vector([(polar.sin() * azimuth.cos()) as f32, (polar.sin() * azimuth.sin()) as f32, polar.cos() as f32]))
+}
+
+fn parse_exposure(text: &str) -> std::result::Result<f32, String> {
+    text.parse().ok().filter(|f: &f32| f.is_finite() && *f > 0.0).ok_or_else(|| "a positive number".into())
+}
+
+/// Text to stdout.
+fn print(text: &str) -> Result<()> {
+    files::write(Path::new("-"), text.as_bytes())
+}
+
+/// Anything as JSON, to stdout.
+fn print_json(value: &impl serde::Serialize) -> Result<()> {
+    print(&(serde_json::to_string_pretty(value).expect("plain data") + "\n"))
+}
+
+/// Whether bytes are those of a dictionary file.
+fn is_dictionary(bytes: &[u8]) -> bool {
+    bytes.get(16..20) == Some(&[1, 0, 0, 0])
 }
 
 /// A material's bytes, opened for as long as `use_it` runs.
 fn with_material<T>(source: &Source, use_it: impl FnOnce(selvedge::Selvedge<'_>) -> Result<T>) -> Result<T> {
     let bytes = files::read(&source.file)?;
     let dictionary = source.dictionary.as_deref().map(files::read).transpose()?;
+    if is_dictionary(&bytes) && selvedge::validate(&bytes, None, &Limits::NONE, &mut |_: selvedge::Finding| false) {
+        return Err(ToolError::Usage(format!("{} is a dictionary, which has no image: give a material", source.file.display())));
+    }
     let opened = selvedge::open_with(&bytes, dictionary.as_deref(), &source.limits.limits());
     use_it(opened.map_err(|finding| ToolError::Invalid { path: source.file.clone(), finding })?)
 }
 
 fn import(folder: &Path, material: Option<String>, blocks: Option<[usize; 2]>, value_bits: u32, output: &Path, dictionary: Option<&Path>) -> Result<()> {
+    if dictionary.is_some_and(|dictionary| dictionary == output) {
+        return Err(ToolError::Usage("--output and --dictionary must be two files".into()));
+    }
     let name = match material {
-        Some(name) => name,
+        Some(name) if sparsebtf::materials_in(folder)?.contains(&name) => name,
+        Some(name) => {
+            let there = sparsebtf::materials_in(folder)?.join(", ");
+            return Err(ToolError::Usage(format!("{}: no Coeffs_BTF_{name}_1e-05_U.bin; materials there: {there}", folder.display())));
+        }
         None => match sparsebtf::materials_in(folder)?.as_slice() {
             [only] => only.clone(),
             [] => return Err(ToolError::Usage(format!("{}: no Coeffs_BTF_NAME_1e-05_U.bin", folder.display()))),
@@ -169,25 +201,30 @@ fn import(folder: &Path, material: Option<String>, blocks: Option<[usize; 2]>, v
     files::write(output, &material)
 }
 
+/// Tells what is found in each file; the exit code is that of the first that is not good.
 fn validate(paths: &[PathBuf], dictionary: Option<&Path>, limits: &Limits, json: bool) -> Result<u8> {
     let dictionary = dictionary.map(files::read).transpose()?;
     let mut reports = Vec::new();
+    let mut code = 0;
     for path in paths {
-        reports.push(inspect::validate(&path.display().to_string(), &files::read(path)?, dictionary.as_deref(), limits));
+        let bytes = match files::read(path) {
+            Ok(bytes) => bytes,
+            Err(error) => {
+                eprintln!("selvedge: {error}");
+                code = if code == 0 { error.exit_code() } else { code };
+                continue;
+            }
+        };
+        let own = dictionary.as_deref().filter(|_| !is_dictionary(&bytes));
+        let report = inspect::validate(&path.display().to_string(), &bytes, own, limits);
+        code = if code == 0 { report.exit_code } else { code };
+        if !json {
+            print(&inspect::validation_text(&report))?;
+        }
+        reports.push(report);
     }
-    let code = reports.iter().map(|report| report.exit_code).find(|&code| code != 0).unwrap_or(0);
     if json {
-        println!("{}", serde_json::to_string_pretty(&reports).expect("plain data"));
-        return Ok(code);
-    }
-    for report in reports {
-        for finding in &report.findings {
-            let part = if finding.part == "dictionary" { " (dictionary)" } else { "" };
-            println!("{}{part}: {} at byte {}: {}; found {} ({:#x})", report.file, finding.rule, finding.offset, finding.title, finding.found, finding.found);
-        }
-        if report.count > report.findings.len() {
-            println!("{}: {} findings in all", report.file, report.count);
-        }
+        print_json(&reports)?;
     }
     Ok(code)
 }
@@ -201,17 +238,22 @@ fn run(cli: Cli) -> Result<u8> {
         Command::Info { source, json } => with_material(&source, |material| {
             let info = inspect::info(&material);
             if json {
-                println!("{}", serde_json::to_string_pretty(&info).expect("plain data"));
+                print_json(&info)?
             } else {
-                print!("{}", inspect::info_text(&info));
+                print(&inspect::info_text(&info))?
             }
             Ok(0)
         }),
         Command::Validate { files, dictionary, limits, json } => validate(&files, dictionary.as_deref(), &limits.limits(), json),
         Command::Decode { source, output, light, view, level, layers, exposure } => with_material(&source, |material| {
+            let header = material.header();
+            let most = [("--level", level, 0, header.level_count - 1), ("--layers", layers.unwrap_or(1), 1, header.layer_count)];
+            if let Some((name, _, low, high)) = most.iter().find(|(_, given, low, high)| !(low..=high).contains(&given)) {
+                return Err(ToolError::Usage(format!("{name}: this file has {low} to {high}")));
+            }
             let material = layers.map_or(material, |layers| material.with_layers(layers));
             let picture = demo::decode_picture(&material, level, light, view)?;
-            let is_exr = output.extension().is_some_and(|ending| ending == "exr");
+            let is_exr = output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("exr"));
             let picture = if is_exr { picture } else { picture.exposed(exposure) };
             picture.save(&output).map(|()| 0)
         }),

@@ -93,7 +93,7 @@ impl Picture {
 
     /// Writes a PNG or an EXR, by the name's ending.
     pub fn save(&self, path: &Path) -> Result<()> {
-        match path.extension().and_then(|ending| ending.to_str()) {
+        match path.extension().and_then(|ending| ending.to_str()).map(str::to_ascii_lowercase).as_deref() {
             Some("png") => files::write(path, &self.to_png()),
             Some("exr") => files::write(path, &self.to_exr()),
             _ => Err(ToolError::Usage(format!("{}: pictures end in .png or .exr", path.display()))),

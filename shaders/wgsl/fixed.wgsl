@@ -1,7 +1,7 @@
 // Fixed-point arithmetic (chapter 2). Twin: decoder-core/src/fixed.rs.
 //
 // Everything that decides a bit of a result is here or built from what is here: 32-bit integers that
-// wrap, shifts, comparisons. Nothing divides and nothing is a float, so every machine agrees.
+// wrap, shifts, comparisons. There is no division and no float, so every machine agrees.
 
 // One in Q15.
 const ONE_Q15: i32 = 32768;
@@ -19,7 +19,7 @@ const EXP2_C6: u32 = 0x000e2a0cu;
 // The largest finite binary32.
 const BINARY32_MAX: u32 = 0x7f7fffffu;
 
-// floor((p * u + 2^14) / 2^15), for |u| <= 2^15, and below it if p is -2^31 (2.2-1).
+// floor((p * u + 2^14) / 2^15), for |u| <= 2^15; if p is -2^31, u is above -2^15 (2.2-1).
 fn multiply_q15(p: i32, u: i32) -> i32 {
     // 2.2-1: the high limb is exact, only the low one is rounded.
     return (p >> 15u) * u + (((p & 0x7fff) * u + HALF_Q15) >> 15u);
