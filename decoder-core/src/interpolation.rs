@@ -1,7 +1,7 @@
 //! Interpolation in the model (chapter 8) and levels (chapter 9). Twin: `shaders/wgsl/interpolation.wgsl`.
 //!
 //! What every method shares: means and scales for pairs of directions, the value of a channel, and the
-//! samples that a caller can ask for. The method adds the texture: [`crate::ensemble::texture_q20`].
+//! samples that a caller can ask for. The method adds the texture: `texture_q20`.
 
 use crate::colour::{Rgb, Values, colour};
 use crate::direction::{Direction, Taps, locate, single_tap};
