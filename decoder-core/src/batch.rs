@@ -14,7 +14,7 @@ use crate::interpolation::{VALUE_BOUND, radiance, scale_texture};
 use crate::material::{CHANNEL_FULL, CHANNEL_MISSING, Channel};
 use crate::open::Selvedge;
 use crate::position::{Axis, Span, axis_at_position, block_count};
-use crate::records::{Table, entry, for_each_coefficient, record_of};
+use crate::records::{Blend, Table, entry, for_each_coefficient, record_of};
 use crate::result::{BufferTooSmall, position_from_f32};
 use crate::words::{Words, high_i16, low_i16, word};
 
@@ -517,11 +517,9 @@ impl<'a, 's> ReadySet<'a, 's> {
 /// Columns of one query's rows, blended into its lane (10.6-1).
 #[inline(always)]
 fn blend_lane(table: Table<'_>, taps: Taps, columns: &[i32], lanes: &mut [Lanes], lane: usize) {
-    let (a, b, c) = (table.row(taps.a), table.row(taps.b), table.row(taps.c));
+    let blend = Blend::rows(table, taps);
     for (&column, slots) in columns.iter().zip(lanes) {
-        let column = column as u32;
-        let sum = entry(a, column).wrapping_mul(taps.weight_a_q15).wrapping_add(entry(b, column).wrapping_mul(taps.weight_b_q15));
-        slots[lane & 7] = sum.wrapping_add(entry(c, column).wrapping_mul(taps.weight_c_q15)).wrapping_add(HALF_Q15) >> 15;
+        slots[lane & 7] = blend.column(column as u32);
     }
 }
 

@@ -42,11 +42,7 @@ pub(crate) fn check_method(check: &mut Check<'_, '_>, header: &Header, external:
     let mut angular_of = [None::<Factors>; 3];
     for (c, slot) in (0u32..).zip(angular_of.iter_mut()).filter(|(c, _)| header.is_full(*c)) {
         *slot = Some(match external {
-            // Checked already, with its own file.
-            Some(other) => check.in_dictionary(|inner| {
-                let start = inner.section_start(find_section(inner, other, ANGULAR, c)?);
-                Some(Factors { start, count: word(inner.words, start) })
-            })?,
+            Some(other) => factors_in_dictionary(check, other, ANGULAR, c)?,
             None => {
                 let section = find_section(check, header, ANGULAR, c)?;
                 check_factors(check, section, header.light_count, header.view_count, ANGULAR_COLUMN_LIMIT)?
@@ -56,10 +52,7 @@ pub(crate) fn check_method(check: &mut Check<'_, '_>, header: &Header, external:
     for (c, slot) in (0u32..).zip(spatial_of.iter_mut()).filter(|(c, _)| header.is_full(*c)) {
         *slot = Some(match (find_section(check, header, SPATIAL, c), external) {
             (Some(section), _) => check_factors(check, section, header.edge, header.edge, header.edge)?,
-            (None, Some(other)) => check.in_dictionary(|inner| {
-                let start = inner.section_start(find_section(inner, other, SPATIAL, c)?);
-                Some(Factors { start, count: word(inner.words, start) })
-            })?,
+            (None, Some(other)) => factors_in_dictionary(check, other, SPATIAL, c)?,
             (None, None) => return None,
         });
     }
@@ -102,6 +95,14 @@ pub(crate) fn check_method(check: &mut Check<'_, '_>, header: &Header, external:
         records = records.max(at_level);
     }
     sound.then_some(records)
+}
+
+/// Factors of the external dictionary, which was checked with its own file.
+fn factors_in_dictionary(check: &mut Check<'_, '_>, other: &Header, kind: u32, channel: u32) -> Option<Factors> {
+    check.in_dictionary(|inner| {
+        let start = inner.section_start(find_section(inner, other, kind, channel)?);
+        Some(Factors { start, count: word(inner.words, start) })
+    })
 }
 
 /// The first section of coefficients.

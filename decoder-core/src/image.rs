@@ -11,7 +11,7 @@ use crate::fixed::{HALF_Q15, clamp_magnitude, multiply_q15, round_shift};
 use crate::interpolation::{VALUE_BOUND, mean_q20, radiance, scale_q15, scale_texture};
 use crate::material::{CHANNEL_FULL, CHANNEL_MISSING, Channel, level_size};
 use crate::open::Selvedge;
-use crate::records::{Table, atoms_of, entry, for_each_coefficient, record_of};
+use crate::records::{Blend, Table, atoms_of, entry, for_each_coefficient, record_of};
 use crate::result::BufferTooSmall;
 use crate::words::word;
 
@@ -163,18 +163,11 @@ impl Selvedge<'_> {
         let words = self.words();
         let mut slots = out.iter_mut();
         for k in 0..word(words, channel.atoms_start) {
-            let columns = |which: u32, taps: Taps| {
-                let table = Table::new(words, channel.angular_start, k, which);
-                let (a, b, c) = (table.row(taps.a), table.row(taps.b), table.row(taps.c));
-                move |column: u32| {
-                    let sum = entry(a, column).wrapping_mul(taps.weight_a_q15).wrapping_add(entry(b, column).wrapping_mul(taps.weight_b_q15));
-                    sum.wrapping_add(entry(c, column).wrapping_mul(taps.weight_c_q15)).wrapping_add(HALF_Q15) >> 15
-                }
-            };
+            let columns = |which: u32, taps: Taps| Blend::rows(Table::new(words, channel.angular_start, k, which), taps);
             let (u_light, u_view) = (columns(0, light), columns(1, view));
             for (&[a0, a1, a2, a3, ..], slot) in atoms_of(words, channel, k).iter().zip(&mut slots) {
                 let atom = u32::from_le_bytes([a0, a1, a2, a3]);
-                let product = u_light((atom >> 14) & 0x3ff).wrapping_mul(u_view((atom >> 4) & 0x3ff));
+                let product = u_light.column((atom >> 14) & 0x3ff).wrapping_mul(u_view.column((atom >> 4) & 0x3ff));
                 *slot = product.wrapping_add(HALF_Q15) >> 15;
             }
         }

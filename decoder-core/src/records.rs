@@ -1,6 +1,8 @@
 //! Records unpacked for whole images and batches: each coefficient once, then used for many samples.
 
+use crate::direction::Taps;
 use crate::ensemble::{Record, coefficients_start, dequantise, read_record};
+use crate::fixed::HALF_Q15;
 use crate::material::{Channel, Material};
 use crate::stream::{Ones, window};
 use crate::words::Words;
@@ -86,6 +88,29 @@ impl<'a> Table<'a> {
     pub fn row(&self, row: u32) -> &'a [[u8; 2]] {
         let start = self.row_bytes.wrapping_mul(row as usize);
         self.bytes.get(start..start.wrapping_add(self.row_bytes)).unwrap_or(&[]).as_chunks::<2>().0
+    }
+}
+
+/// Three rows of a table by the weights of taps.
+#[derive(Clone, Copy)]
+pub(crate) struct Blend<'a> {
+    rows: [&'a [[u8; 2]]; 3],
+    taps: Taps,
+}
+
+impl<'a> Blend<'a> {
+    /// The rows that the taps name.
+    #[inline(always)]
+    pub fn rows(table: Table<'a>, taps: Taps) -> Blend<'a> {
+        Blend { rows: [table.row(taps.a), table.row(taps.b), table.row(taps.c)], taps }
+    }
+
+    /// One column, Q15, one rounding (10.6-1).
+    #[inline(always)]
+    pub fn column(&self, column: u32) -> i32 {
+        let [a, b, c] = self.rows;
+        let sum = entry(a, column).wrapping_mul(self.taps.weight_a_q15).wrapping_add(entry(b, column).wrapping_mul(self.taps.weight_b_q15));
+        sum.wrapping_add(entry(c, column).wrapping_mul(self.taps.weight_c_q15)).wrapping_add(HALF_Q15) >> 15
     }
 }
 

@@ -3,8 +3,6 @@
 
 use crate::error::{Result, ToolError};
 use crate::picture::{Picture, false_colour};
-#[cfg(feature = "gpu")]
-use crate::random::Random;
 use crate::sparsebtf::{AuthorsMaterial, read_material};
 use crate::{files, inspect, write};
 use selvedge::batch::FilteredQuery;
@@ -146,7 +144,8 @@ fn channel_tiles(authors: &AuthorsMaterial, material: &Selvedge<'_>, channel: us
 
 #[cfg(feature = "gpu")]
 fn compare_with_gpu(materials: &[Selvedge<'_>], say: &mut dyn FnMut(String)) -> Result<String> {
-    use crate::gpu::{Answer, Gpu, Query, answer_on_cpu, direction_words};
+    use crate::gpu::{Answer, Gpu, Query, answer_on_cpu, direction_words, random_query};
+    use crate::random::Random;
     let Some(gpu) = Gpu::any()? else {
         say("NO GPU ADAPTER FOUND, NOT EVEN A SOFTWARE ONE: THE KERNEL WAS NOT RUN AND NOTHING WAS COMPARED.".into());
         return Ok("NO ADAPTER FOUND: THE KERNEL WAS NOT RUN".into());
@@ -173,7 +172,10 @@ fn compare_with_gpu(materials: &[Selvedge<'_>], say: &mut dyn FnMut(String)) -> 
         let taps = (material.locate_light(light), material.locate_view(view));
         let values =
             |i: usize| selvedge::interpolation::texel_values(material.words(), material.material(), i as u32 % size[0], i as u32 / size[0], taps.0, taps.1);
-        let answer = |(i, rgb): (usize, &[f32; 3])| Answer { rgb: rgb.map(f32::to_bits), values: [values(i).c0, values(i).c1, values(i).c2] };
+        let answer = |(i, rgb): (usize, &[f32; 3])| {
+            let [r, g, b] = rgb.map(f32::to_bits);
+            Answer::new(Rgb { r, g, b }, values(i))
+        };
         let cpu: Vec<Answer> = picture.pixels.iter().enumerate().map(answer).collect();
         compare(&on_gpu, &cpu);
     }
@@ -189,31 +191,6 @@ fn compare_with_gpu(materials: &[Selvedge<'_>], say: &mut dyn FnMut(String)) -> 
 fn compare_with_gpu(_: &[Selvedge<'_>], say: &mut dyn FnMut(String)) -> Result<String> {
     say("BUILT WITHOUT THE gpu FEATURE: THE KERNEL WAS NOT RUN AND NOTHING WAS COMPARED.".into());
     Ok("BUILT WITHOUT THE gpu FEATURE".into())
-}
-
-/// A query of an entry point: any position, directions over the hemisphere and a little beyond.
-#[cfg(feature = "gpu")]
-pub fn random_query(random: &mut Random, entry: &str, material: u32) -> crate::gpu::Query {
-    let u = random.word();
-    let v = random.word();
-    let level_q16 = random.word() >> 12;
-    let mut direction = || match entry {
-        "texel" => [random.word() >> 20, 0, 0],
-        "floats" => {
-            let z = random.range(-100, 1000) as f32 / 1000.0;
-            let azimuth = random.range(0, 100_000) as f32 / 100_000.0 * std::f32::consts::TAU;
-            let r = (1.0 - z * z).max(0.0).sqrt();
-            [r * azimuth.cos(), r * azimuth.sin(), z].map(f32::to_bits)
-        }
-        _ => [random.range(-262_400, 262_400), random.range(-262_400, 262_400), random.range(-9, 32_800)].map(|c| c as u32),
-    };
-    let (light, view) = (direction(), direction());
-    let (u, v) = match entry {
-        "texel" => (u >> 22, v >> 22),
-        "floats" => ((u as i32 as f32 / 1e9).to_bits(), (v as i32 as f32 / 1e9).to_bits()),
-        _ => (u, v),
-    };
-    crate::gpu::Query { material, u, v, level_q16, light, view }
 }
 
 /// Runs the demo into a folder; `say` takes each line of progress.

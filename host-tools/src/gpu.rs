@@ -1,8 +1,8 @@
 //! Runs the kernel on an adapter: materials in one buffer, lists of queries, answers word for word.
 
 use crate::error::{Result, ToolError};
+use crate::random::Random;
 use selvedge::{Direction, Rgb, Selvedge, Values};
-use selvedge_shaders::{Method, Request, assemble};
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 use wgpu::util::DeviceExt as _;
@@ -131,7 +131,7 @@ impl Gpu {
         };
         let descriptor = wgpu::DeviceDescriptor { required_limits, ..Default::default() };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).map_err(|e| ToolError::Kernel(e.to_string()))?;
-        let source = assemble(&Request { methods: &[Method::SparseEnsemble], entries: true });
+        let source = crate::kernel::source();
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some("selvedge"), source: wgpu::ShaderSource::Wgsl(source.into()) });
         let entries: Vec<wgpu::BindGroupLayoutEntry> = (0..4)
             .map(|binding| wgpu::BindGroupLayoutEntry {
@@ -236,4 +236,28 @@ impl Gpu {
     pub fn image(&self, loaded: &Loaded, query: Query, size: [u32; 2]) -> Result<Vec<Answer>> {
         self.run(loaded, "image", &[query], (size[0] * size[1]) as usize, size.map(|s| s.div_ceil(8)))
     }
+}
+
+/// A query of an entry point: any position, directions over the hemisphere and a little beyond.
+pub fn random_query(random: &mut Random, entry: &str, material: u32) -> Query {
+    let u = random.word();
+    let v = random.word();
+    let level_q16 = random.word() >> 12;
+    let mut direction = || match entry {
+        "texel" => [random.word() >> 20, 0, 0],
+        "floats" => {
+            let z = random.range(-100, 1000) as f32 / 1000.0;
+            let azimuth = random.range(0, 100_000) as f32 / 100_000.0 * std::f32::consts::TAU;
+            let r = (1.0 - z * z).max(0.0).sqrt();
+            [r * azimuth.cos(), r * azimuth.sin(), z].map(f32::to_bits)
+        }
+        _ => [random.range(-262_400, 262_400), random.range(-262_400, 262_400), random.range(-9, 32_800)].map(|c| c as u32),
+    };
+    let (light, view) = (direction(), direction());
+    let (u, v) = match entry {
+        "texel" => (u >> 22, v >> 22),
+        "floats" => ((u as i32 as f32 / 1e9).to_bits(), (v as i32 as f32 / 1e9).to_bits()),
+        _ => (u, v),
+    };
+    Query { material, u, v, level_q16, light, view }
 }

@@ -18,12 +18,19 @@ fn validated(source: &str) -> Result<(naga::Module, ModuleInfo)> {
     Ok((module, info))
 }
 
+/// The methods of this version.
+const METHODS: &[Method] = &[Method::SparseEnsemble];
+
+/// The kernel with its entry points, as WGSL.
+pub fn source() -> String {
+    assemble(&Request { methods: METHODS, entries: true })
+}
+
 /// Every translation: `selvedge.wgsl` (with entry points), `selvedge_functions.wgsl` (without), `selvedge.spv`,
 /// `selvedge.metal`, `selvedge.hlsl`, and one `selvedge_NAME.comp` in GLSL ES 3.1 for each entry point.
 pub fn translate() -> Result<Vec<KernelFile>> {
-    let methods = &[Method::SparseEnsemble];
-    let source = assemble(&Request { methods, entries: true });
-    let functions = assemble(&Request { methods, entries: false });
+    let source = source();
+    let functions = assemble(&Request { methods: METHODS, entries: false });
     validated(&functions)?;
     let (module, info) = validated(&source)?;
     let mut files = vec![("selvedge.wgsl".to_owned(), source.into_bytes()), ("selvedge_functions.wgsl".to_owned(), functions.into_bytes())];

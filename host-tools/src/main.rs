@@ -3,6 +3,7 @@
 //! Exit codes: 0 good, 1 bad usage, 2 I/O, 3 invalid file, 4 over limits, 5 unsupported.
 
 use clap::{Args, Parser, Subcommand};
+use selvedge::header::CONTENT_DICTIONARY;
 use selvedge::{Direction, Limits};
 use selvedge_tools::error::{Result, ToolError};
 use selvedge_tools::{demo, files, inspect, kernel, sparsebtf, write};
@@ -162,35 +163,32 @@ fn print_json(value: &impl serde::Serialize) -> Result<()> {
 
 /// Whether bytes are those of a dictionary file.
 fn is_dictionary(bytes: &[u8]) -> bool {
-    bytes.get(16..20) == Some(&[1, 0, 0, 0])
+    bytes.get(16..20) == Some(&CONTENT_DICTIONARY.to_le_bytes())
 }
 
 /// A material's bytes, opened for as long as `use_it` runs.
 fn with_material<T>(source: &Source, use_it: impl FnOnce(selvedge::Selvedge<'_>) -> Result<T>) -> Result<T> {
     let bytes = files::read(&source.file)?;
     let dictionary = source.dictionary.as_deref().map(files::read).transpose()?;
-    if is_dictionary(&bytes) && selvedge::validate(&bytes, None, &Limits::NONE, &mut |_: selvedge::Finding| false) {
-        return Err(ToolError::Usage(format!("{} is a dictionary, which has no image: give a material", source.file.display())));
-    }
     let opened = selvedge::open_with(&bytes, dictionary.as_deref(), &source.limits.limits());
-    use_it(opened.map_err(|finding| ToolError::Invalid { path: source.file.clone(), finding })?)
+    use_it(opened.map_err(|finding| match finding {
+        selvedge::Finding { rule: selvedge::Rule::Content, part: selvedge::Part::File, found: CONTENT_DICTIONARY, .. } => {
+            ToolError::Usage(format!("{} is a dictionary, which has no image: give a material", source.file.display()))
+        }
+        finding => ToolError::Invalid { path: source.file.clone(), finding },
+    })?)
 }
 
 fn import(folder: &Path, material: Option<String>, blocks: Option<[usize; 2]>, value_bits: u32, output: &Path, dictionary: Option<&Path>) -> Result<()> {
     if dictionary.is_some_and(|dictionary| dictionary == output) {
         return Err(ToolError::Usage("--output and --dictionary must be two files".into()));
     }
-    let name = match material {
-        Some(name) if sparsebtf::materials_in(folder)?.contains(&name) => name,
-        Some(name) => {
-            let there = sparsebtf::materials_in(folder)?.join(", ");
-            return Err(ToolError::Usage(format!("{}: no Coeffs_BTF_{name}_1e-05_U.bin; materials there: {there}", folder.display())));
-        }
-        None => match sparsebtf::materials_in(folder)?.as_slice() {
-            [only] => only.clone(),
-            [] => return Err(ToolError::Usage(format!("{}: no Coeffs_BTF_NAME_1e-05_U.bin", folder.display()))),
-            several => return Err(ToolError::Usage(format!("--material says which: {}", several.join(", ")))),
-        },
+    let there = sparsebtf::materials_in(folder)?;
+    let name = match (material, there.as_slice()) {
+        (Some(name), there) if there.contains(&name) => name,
+        (None, [only]) => only.clone(),
+        (_, []) => return Err(ToolError::Usage(format!("{}: no Coeffs_BTF_NAME_1e-05_{{Y,U,V}}.bin", folder.display()))),
+        (_, there) => return Err(ToolError::Usage(format!("--material says which: {}", there.join(", ")))),
     };
     let model = sparsebtf::read_material(folder, &name, blocks)?.to_model(value_bits)?;
     let Some(dictionary) = dictionary else {
@@ -258,13 +256,13 @@ fn run(cli: Cli) -> Result<u8> {
             picture.save(&output).map(|()| 0)
         }),
         Command::Kernel { out } => {
-            let translated = kernel::translate()?;
             match out {
                 Some(folder) => {
+                    let translated = kernel::translate()?;
                     std::fs::create_dir_all(&folder).map_err(ToolError::io(&folder))?;
                     translated.iter().try_for_each(|(name, bytes)| files::write(&folder.join(name), bytes))?;
                 }
-                None => files::write(Path::new("-"), &translated[0].1)?,
+                None => print(&kernel::source())?,
             }
             Ok(0)
         }

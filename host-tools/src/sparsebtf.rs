@@ -97,9 +97,13 @@ pub fn materials_in(folder: &Path) -> Result<Vec<String>> {
     let mut names: Vec<String> = std::fs::read_dir(folder)
         .map_err(ToolError::io(folder))?
         .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
-        .filter_map(|name| Some(name.strip_prefix("Coeffs_BTF_")?.strip_suffix("_1e-05_U.bin")?.to_owned()))
+        .filter_map(|name| {
+            let name = name.strip_prefix("Coeffs_BTF_")?;
+            ["Y", "U", "V"].iter().find_map(|letter| name.strip_suffix(&format!("_1e-05_{letter}.bin"))).map(str::to_owned)
+        })
         .collect();
     names.sort();
+    names.dedup();
     Ok(names)
 }
 

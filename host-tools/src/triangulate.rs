@@ -29,11 +29,6 @@ impl Triangulation {
     }
 }
 
-fn cross(a: [i32; 2], b: [i32; 2], p: [i32; 2]) -> i64 {
-    let [a, b, p] = [a, b, p].map(|q| q.map(i64::from));
-    (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
-}
-
 /// Exact in-circle determinant: zero if `d` is on the circle of the counter-clockwise `a`, `b`, `c`.
 fn in_circle(a: [i32; 2], b: [i32; 2], c: [i32; 2], d: [i32; 2]) -> i128 {
     let row = |p: [i32; 2]| {
@@ -157,14 +152,17 @@ pub fn unproject(point: [i32; 2]) -> glam::DVec3 {
     glam::DVec3::new(2.0 * x, 2.0 * y, 1.0 - square) / (1.0 + square)
 }
 
-/// Whether all points lie on one line.
-pub fn is_collinear(points: &[[i32; 2]]) -> bool {
-    points.len() < 3 || points[2..].iter().all(|&p| cross(points[0], points[1], p) == 0)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn cross(a: [i32; 2], b: [i32; 2], p: [i32; 2]) -> i32 {
+        selvedge::direction::cross(a[0], a[1], b[0], b[1], p[0], p[1])
+    }
+
+    fn is_collinear(points: &[[i32; 2]]) -> bool {
+        points[2..].iter().all(|&p| cross(points[0], points[1], p) == 0)
+    }
 
     #[test]
     fn a_square_is_a_fan_from_its_lowest_direction() {

@@ -3,6 +3,7 @@
 use crate::model::{CoefficientsModel, EnsembleModel, FactorModel, MaterialModel, MetadataModel, PairTableModel, TransferModel};
 use crate::triangulate::{Triangulation, triangulate};
 use selvedge::cost::{Shape, filtered_operations, record_operations};
+use selvedge::direction::{cross, dot_product};
 use selvedge::direction_set::{cosine_of, reciprocal_of};
 use selvedge::directory::{ANGULAR, ATOMS, COEFFICIENTS, DIRECTIONS, EXTERNAL, MEANS, METADATA, SCALES, SPATIAL};
 use selvedge::ensemble::{LOW_BITS_BITS, SHIFT_BIAS, SHIFT_BITS};
@@ -212,14 +213,13 @@ pub fn directions_part(instance: u32, points: &[[i32; 2]], t: &Triangulation) ->
     }
     for &[a, b, c] in &t.triangles {
         let [p, q, r] = [a, b, c].map(|i| points[i as usize]);
-        let area = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
+        let area = cross(p[0], p[1], q[0], q[1], r[0], r[1]);
         let (shift, reciprocal) = reciprocal_of(area as u32);
         words.extend([a | b << 16, c | shift << 16, reciprocal]);
     }
     for (i, &a) in t.hull.iter().enumerate() {
         let (p, q) = (points[a as usize], points[t.hull[(i + 1) % t.hull.len()] as usize]);
-        let (dx, dy) = (q[0] - p[0], q[1] - p[1]);
-        let (shift, reciprocal) = reciprocal_of((dx * dx + dy * dy) as u32);
+        let (shift, reciprocal) = reciprocal_of(dot_product(p[0], p[1], q[0], q[1], q[0], q[1]) as u32);
         words.extend([a | shift << 16, reciprocal]);
     }
     words.extend(&t.starts);

@@ -5,9 +5,8 @@
 
 use selvedge::{Direction, Limits, Selvedge};
 use selvedge_tests::{excerpt_folder, full_data_folder, setting};
-use selvedge_tools::demo::random_query;
 use selvedge_tools::extreme::extreme_model;
-use selvedge_tools::gpu::{Answer, Gpu, Query, answer_on_cpu, direction_words};
+use selvedge_tools::gpu::{Answer, Gpu, Query, answer_on_cpu, direction_words, random_query};
 use selvedge_tools::random::Random;
 use selvedge_tools::{example, gpu, sparsebtf, write};
 
