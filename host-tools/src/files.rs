@@ -34,6 +34,11 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut beside = tempfile::Builder::new().prefix(".selvedge-").tempfile_in(folder).map_err(|error| ToolError::io(path)(error.kind().into()))?;
     beside.write_all(bytes).and_then(|()| beside.as_file().sync_all()).map_err(ToolError::io(path))?;
+    persist(beside, path)
+}
+
+/// Puts a file that was written beside its place there.
+pub fn persist(beside: tempfile::NamedTempFile, path: &Path) -> Result<()> {
     // A temporary file is private; a result has the permissions that a new file would have.
     #[cfg(unix)]
     {

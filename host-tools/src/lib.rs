@@ -9,7 +9,9 @@
 //! | [`example`], [`extreme`], [`random`] | files that the specification and the tests use |
 //! | [`files`], [`error`] | whole writes, exit codes |
 
+pub mod dataset;
 pub mod demo;
+pub mod directions;
 pub mod error;
 pub mod example;
 pub mod extreme;

@@ -1,0 +1,399 @@
+//! The working file of a measured or modelled material: every texel's radiance for every pair of directions.
+//!
+//! Training and encoding read it twice and never hold it in memory. Its values stand texel by texel, so that
+//! a block of any edge is `edge` runs of bytes, whichever edge is tried:
+//!
+//! `values[y][x][view][light][red, green, blue]`, linear radiance, binary16 or binary32, little-endian.
+//!
+//! Before them stands a head: 8 bytes of magic, its length, and a JSON object of [`Description`] and
+//! [`Statistics`]. The file is a tool's working file, not a format to publish; `.selv` is.
+
+use crate::error::{Result, ToolError};
+use glam::DVec3;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::fs::File;
+use std::io::Write as _;
+use std::os::unix::fs::FileExt as _;
+use std::path::{Path, PathBuf};
+
+const MAGIC: &[u8; 8] = b"\x93SELVSET";
+/// Bytes before the values.
+const HEAD_LENGTH: u64 = 65_536;
+/// Most directions, texels along an axis and bytes of values.
+const LIMITS: (usize, usize, u64) = (1024, 16_384, 1 << 43);
+
+/// How a value is stored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Sample {
+    /// IEEE binary16.
+    #[default]
+    Half,
+    /// IEEE binary32.
+    Float,
+}
+
+impl Sample {
+    /// Bytes of a value.
+    pub fn len_bytes(self) -> usize {
+        match self {
+            Sample::Half => 2,
+            Sample::Float => 4,
+        }
+    }
+}
+
+/// What a dataset is.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Description {
+    /// Texels along x and y.
+    pub size: [usize; 2],
+    /// Light directions: unit vectors in the tangent frame.
+    pub lights: Vec<DVec3>,
+    /// View directions.
+    pub views: Vec<DVec3>,
+    /// How values are stored.
+    pub sample: Sample,
+    /// Values contain the cosine of the light's angle.
+    pub cosine_included: bool,
+    /// Width and height of a texel in nanometres, 0 if unknown.
+    pub texel_nm: [u32; 2],
+    /// Name, origin of the data, licence.
+    pub texts: [String; 3],
+}
+
+impl Description {
+    /// Pairs of directions.
+    pub fn pairs(&self) -> usize {
+        self.lights.len() * self.views.len()
+    }
+
+    /// Numbers of one texel: `[view][light][colour]`.
+    pub fn texel_len(&self) -> usize {
+        self.pairs() * 3
+    }
+
+    /// Texels.
+    pub fn texels(&self) -> usize {
+        self.size[0] * self.size[1]
+    }
+
+    /// Bytes of the values in binary16, by which ratios of compression are counted.
+    pub fn half_bytes(&self) -> u64 {
+        self.texels() as u64 * self.texel_len() as u64 * 2
+    }
+
+    fn check(&self) -> std::result::Result<(), String> {
+        let (directions, side, bytes) = LIMITS;
+        for (name, set) in [("light", &self.lights), ("view", &self.views)] {
+            if set.is_empty() || set.len() > directions {
+                return Err(format!("{} {name} directions; 1 to {directions} are possible", set.len()));
+            }
+            if let Some(i) = set.iter().position(|d| !d.is_finite() || (d.length() - 1.0).abs() > 1e-3 || d.z < 0.0) {
+                return Err(format!("{name} direction {i} is not a unit vector of the upper hemisphere"));
+            }
+        }
+        if self.size.iter().any(|&n| n == 0 || n > side) {
+            return Err(format!("{} x {} texels; 1 to {side} along an axis are possible", self.size[0], self.size[1]));
+        }
+        let length = self.texels() as u64 * self.texel_len() as u64 * self.sample.len_bytes() as u64;
+        if length > bytes {
+            return Err(format!("{length} bytes of values; {bytes} are possible"));
+        }
+        Ok(())
+    }
+}
+
+/// What a pass over the values finds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Statistics {
+    /// Mean of each colour.
+    pub mean: [f64; 3],
+    /// Least value.
+    pub least: f32,
+    /// Largest value.
+    pub largest: f32,
+}
+
+impl Statistics {
+    /// One thousandth of the mean: the offset of every logarithm that errors are measured by.
+    ///
+    /// For a black material, whose mean is zero, a millionth.
+    pub fn log_offset(&self) -> f32 {
+        let mean = self.mean.iter().sum::<f64>() / 3.0;
+        if mean > 0.0 { (mean / 1000.0).max(1e-30) as f32 } else { 1e-6 }
+    }
+}
+
+#[derive(Serialize, Deserialize)]
+struct Head {
+    description: Description,
+    statistics: Statistics,
+}
+
+/// A dataset being written, beside its place until it is whole.
+pub struct Writer {
+    file: tempfile::NamedTempFile,
+    path: PathBuf,
+    description: Description,
+}
+
+fn invalid(path: &Path, offset: u64, what: impl Into<String>) -> ToolError {
+    ToolError::Foreign { path: path.to_owned(), offset, what: what.into() }
+}
+
+impl Writer {
+    /// Begins a dataset.
+    ///
+    /// # Errors
+    /// If the description is beyond what a dataset can be, or the folder cannot be written to.
+    pub fn create(path: &Path, description: Description) -> Result<Writer> {
+        description.check().map_err(|what| ToolError::Usage(format!("{}: {what}", path.display())))?;
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let file = tempfile::Builder::new().prefix(".selvedge-").tempfile_in(folder).map_err(|error| ToolError::io(path)(error.kind().into()))?;
+        let length = HEAD_LENGTH + description.texels() as u64 * description.texel_len() as u64 * description.sample.len_bytes() as u64;
+        file.as_file().set_len(length).map_err(ToolError::io(path))?;
+        Ok(Writer { file, path: path.to_owned(), description })
+    }
+
+    /// What is being written.
+    pub fn description(&self) -> &Description {
+        &self.description
+    }
+
+    /// Writes numbers of one texel from pair `first_pair` on, `[view][light][colour]`; any thread may.
+    ///
+    /// # Errors
+    /// If a number is negative or not finite (or, with the place, beyond binary16 where that is stored), or on I/O.
+    pub fn put(&self, texel: usize, first_pair: usize, values: &[f32]) -> Result<()> {
+        let largest = if self.description.sample == Sample::Half { 65_504.0 } else { f32::MAX };
+        if let Some(i) = values.iter().position(|v| !(0.0..=largest).contains(v)) {
+            let ([x, y], [light, view]) = (self.texel_place(texel), self.pair_place(first_pair + i / 3));
+            let what = format!("texel ({x}, {y}), light {light}, view {view}: {} is not a radiance from 0 to {largest:e}", values[i]);
+            return Err(ToolError::Usage(format!("{}: {what}", self.path.display())));
+        }
+        let bytes: Vec<u8> = match self.description.sample {
+            Sample::Half => values.iter().flat_map(|&v| half::f16::from_f32(v).to_le_bytes()).collect(),
+            Sample::Float => values.iter().flat_map(|v| v.to_le_bytes()).collect(),
+        };
+        let at = (texel * self.description.texel_len() + first_pair * 3) as u64 * self.description.sample.len_bytes() as u64;
+        self.file.as_file().write_all_at(&bytes, HEAD_LENGTH + at).map_err(ToolError::io(&self.path))
+    }
+
+    fn texel_place(&self, texel: usize) -> [usize; 2] {
+        [texel % self.description.size[0], texel / self.description.size[0]]
+    }
+
+    fn pair_place(&self, pair: usize) -> [usize; 2] {
+        [pair % self.description.lights.len(), pair / self.description.lights.len()]
+    }
+
+    /// Measures the values, writes the head and puts the file in its place.
+    pub fn finish(mut self) -> Result<Statistics> {
+        let read = Dataset {
+            file: self.file.reopen().map_err(ToolError::io(&self.path))?,
+            path: self.path.clone(),
+            description: self.description.clone(),
+            statistics: Statistics::default(),
+        };
+        let statistics = read.measure()?;
+        let head = serde_json::to_vec(&Head { description: self.description, statistics }).expect("plain data");
+        if head.len() as u64 > HEAD_LENGTH - 16 {
+            return Err(ToolError::Usage(format!("{}: the texts of the description are too long", self.path.display())));
+        }
+        let mut start = MAGIC.to_vec();
+        start.extend((head.len() as u64).to_le_bytes());
+        start.extend(head);
+        start.resize(HEAD_LENGTH as usize, 0);
+        self.file.as_file().write_all_at(&start, 0).map_err(ToolError::io(&self.path))?;
+        self.file.flush().map_err(ToolError::io(&self.path))?;
+        crate::files::persist(self.file, &self.path)?;
+        Ok(statistics)
+    }
+}
+
+/// A dataset to be read, from any thread.
+#[derive(Debug)]
+pub struct Dataset {
+    file: File,
+    path: PathBuf,
+    description: Description,
+    statistics: Statistics,
+}
+
+impl Dataset {
+    /// Opens a dataset.
+    ///
+    /// # Errors
+    /// If it is none, or shorter than it says.
+    pub fn open(path: &Path) -> Result<Dataset> {
+        let file = File::open(path).map_err(ToolError::io(path))?;
+        let length = file.metadata().map_err(ToolError::io(path))?.len();
+        let mut start = vec![0; HEAD_LENGTH.min(length) as usize];
+        file.read_exact_at(&mut start, 0).map_err(ToolError::io(path))?;
+        if start.len() < HEAD_LENGTH as usize || &start[..8] != MAGIC {
+            return Err(invalid(path, 0, "this is not a dataset"));
+        }
+        let head_length = u64::from_le_bytes(std::array::from_fn(|i| start[8 + i]));
+        let head = start.get(16..).and_then(|rest| rest.get(..usize::try_from(head_length).ok()?));
+        let Some(head) = head else { return Err(invalid(path, 8, format!("a head of {head_length} bytes"))) };
+        let Head { description, statistics } = serde_json::from_slice(head).map_err(|error| invalid(path, 16, error.to_string()))?;
+        description.check().map_err(|what| invalid(path, 16, what))?;
+        let wanted = HEAD_LENGTH + description.texels() as u64 * description.texel_len() as u64 * description.sample.len_bytes() as u64;
+        if length != wanted {
+            return Err(invalid(path, length.min(wanted), format!("{length} bytes where {wanted} are due")));
+        }
+        Ok(Dataset { file, path: path.to_owned(), description, statistics })
+    }
+
+    /// Whether a file begins as a dataset does.
+    pub fn is_one(path: &Path) -> bool {
+        let mut magic = [0; 8];
+        File::open(path).and_then(|file| file.read_exact_at(&mut magic, 0)).is_ok() && &magic == MAGIC
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What it is.
+    pub fn description(&self) -> &Description {
+        &self.description
+    }
+
+    /// What its values are like.
+    pub fn statistics(&self) -> &Statistics {
+        &self.statistics
+    }
+
+    /// Reads numbers of a run of texels: `[texel][view][light][colour]`.
+    ///
+    /// # Errors
+    /// On I/O, and if a number is negative or not finite.
+    pub fn read(&self, first_texel: usize, texels: usize, bytes: &mut Vec<u8>, values: &mut [f32]) -> Result<()> {
+        let size = self.description.sample.len_bytes();
+        let length = texels * self.description.texel_len();
+        bytes.resize(length * size, 0);
+        let at = HEAD_LENGTH + (first_texel * self.description.texel_len() * size) as u64;
+        self.file.read_exact_at(bytes, at).map_err(ToolError::io(&self.path))?;
+        let values = &mut values[..length];
+        match self.description.sample {
+            Sample::Half => {
+                use half::slice::HalfFloatSliceExt as _;
+                // Through aligned halves, which the library converts by vector instructions where it can.
+                let halves: Vec<half::f16> = bytes.as_chunks::<2>().0.iter().map(|&b| half::f16::from_le_bytes(b)).collect();
+                halves.convert_to_f32_slice(values);
+            }
+            Sample::Float => values.iter_mut().zip(bytes.as_chunks::<4>().0).for_each(|(v, &b)| *v = f32::from_le_bytes(b)),
+        }
+        match values.iter().position(|v| !(0.0..=f32::MAX).contains(v)) {
+            Some(i) => Err(invalid(&self.path, at + (i * size) as u64, format!("{} is not a radiance", values[i]))),
+            None => Ok(()),
+        }
+    }
+
+    /// The image of one pair of directions: `[y][x][colour]`.
+    pub fn image(&self, light: usize, view: usize) -> Result<Vec<[f32; 3]>> {
+        let size = self.description.sample.len_bytes();
+        let mut bytes = [0; 12];
+        let pair = view * self.description.lights.len() + light;
+        (0..self.description.texels())
+            .map(|texel| {
+                let at = HEAD_LENGTH + ((texel * self.description.texel_len() + pair * 3) * size) as u64;
+                self.file.read_exact_at(&mut bytes[..3 * size], at).map_err(ToolError::io(&self.path))?;
+                Ok(std::array::from_fn(|c| match self.description.sample {
+                    Sample::Half => half::f16::from_le_bytes([bytes[2 * c], bytes[2 * c + 1]]).to_f32(),
+                    Sample::Float => f32::from_le_bytes(std::array::from_fn(|i| bytes[4 * c + i])),
+                }))
+            })
+            .collect()
+    }
+
+    /// Texels read together by a pass over all of them.
+    pub fn batch(&self) -> usize {
+        ((1 << 20) / self.description.texel_len()).clamp(1, self.description.texels())
+    }
+
+    fn measure(&self) -> Result<Statistics> {
+        let (texels, batch) = (self.description.texels(), self.batch());
+        let starts: Vec<usize> = (0..texels).step_by(batch).collect();
+        let parts: Vec<(DVec3, f32, f32)> = starts
+            .par_iter()
+            .map(|&first| {
+                let count = batch.min(texels - first);
+                let mut values = vec![0.0; count * self.description.texel_len()];
+                self.read(first, count, &mut Vec::new(), &mut values)?;
+                let (mut sum, mut least, mut largest) = (DVec3::ZERO, f32::MAX, 0.0f32);
+                for rgb in values.as_chunks::<3>().0 {
+                    sum += DVec3::from_array(rgb.map(f64::from));
+                    least = rgb.iter().fold(least, |a, &b| a.min(b));
+                    largest = rgb.iter().fold(largest, |a, &b| a.max(b));
+                }
+                Ok((sum, least, largest))
+            })
+            .collect::<Result<_>>()?;
+        // In the order of the texels, whichever thread was first.
+        let mut statistics = Statistics { least: f32::MAX, ..Statistics::default() };
+        let mut total = DVec3::ZERO;
+        for (sum, least, largest) in parts {
+            total += sum;
+            statistics.least = statistics.least.min(least);
+            statistics.largest = statistics.largest.max(largest);
+        }
+        statistics.mean = (total / (texels * self.description.pairs()) as f64).to_array();
+        Ok(statistics)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::directions;
+
+    fn small(sample: Sample) -> Description {
+        let lights = directions::grid(81).expect("known")[..7].to_vec();
+        Description { size: [5, 3], views: lights[..2].to_vec(), lights, sample, ..Description::default() }
+    }
+
+    #[test]
+    fn what_is_written_is_read_and_measured() {
+        let folder = tempfile::tempdir().expect("a folder");
+        for sample in [Sample::Half, Sample::Float] {
+            let path = folder.path().join("a.selvset");
+            let writer = Writer::create(&path, small(sample)).expect("created");
+            let length = writer.description().texel_len();
+            for texel in 0..15 {
+                let values: Vec<f32> = (0..length).map(|i| (texel * length + i) as f32 / 4.0).collect();
+                writer.put(texel, 0, &values[..9]).expect("put");
+                writer.put(texel, 3, &values[9..]).expect("put");
+            }
+            let statistics = writer.finish().expect("finished");
+            let dataset = Dataset::open(&path).expect("opened");
+            assert_eq!(dataset.statistics(), &statistics);
+            assert_eq!((statistics.least, statistics.largest), (0.0, (15 * length - 1) as f32 / 4.0));
+            let mut values = vec![0.0; 2 * length];
+            dataset.read(6, 2, &mut Vec::new(), &mut values).expect("read");
+            assert!(values.iter().enumerate().all(|(i, &v)| v == (6 * length + i) as f32 / 4.0));
+            assert_eq!(dataset.image(3, 1).expect("read")[2], std::array::from_fn(|c| (2 * length + (7 + 3) * 3 + c) as f32 / 4.0));
+        }
+    }
+
+    #[test]
+    fn numbers_that_are_no_radiance_are_refused_with_their_place() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.selvset");
+        let writer = Writer::create(&path, small(Sample::Half)).expect("created");
+        for bad in [f32::NAN, f32::INFINITY, -1.0, 70_000.0] {
+            let mut values = [0.5; 42];
+            values[16] = bad;
+            let said = writer.put(7, 0, &values).expect_err("refused").to_string();
+            assert!(said.contains("texel (2, 1), light 5, view 0"), "{said}");
+        }
+        drop(writer);
+        assert!(!path.exists());
+        std::fs::write(&path, [1; 70]).expect("written");
+        assert!(Dataset::open(&path).is_err());
+    }
+}
