@@ -9,8 +9,10 @@
 //! | [`example`], [`extreme`], [`random`] | files that the specification and the tests use |
 //! | [`files`], [`error`] | whole writes, exit codes |
 
+pub mod blocks;
 pub mod dataset;
 pub mod demo;
+pub mod dictionary;
 pub mod directions;
 pub mod error;
 pub mod example;
@@ -20,9 +22,11 @@ pub mod files;
 pub mod gpu;
 pub mod inspect;
 pub mod kernel;
+pub mod linear;
 pub mod model;
 pub mod picture;
 pub mod random;
 pub mod sparsebtf;
+pub mod transfer;
 pub mod triangulate;
 pub mod write;
