@@ -273,12 +273,22 @@ impl Dataset {
     /// # Errors
     /// On I/O, and if a number is negative or not finite.
     pub fn read(&self, first_texel: usize, texels: usize, bytes: &mut Vec<u8>, values: &mut [f32]) -> Result<()> {
+        self.read_numbers(first_texel * self.description.texel_len(), bytes, &mut values[..texels * self.description.texel_len()])
+    }
+
+    /// Reads numbers of one texel from pair `first_pair` on.
+    ///
+    /// # Errors
+    /// As [`Dataset::read`].
+    pub fn read_pairs(&self, texel: usize, first_pair: usize, bytes: &mut Vec<u8>, values: &mut [f32]) -> Result<()> {
+        self.read_numbers(texel * self.description.texel_len() + first_pair * 3, bytes, values)
+    }
+
+    fn read_numbers(&self, first: usize, bytes: &mut Vec<u8>, values: &mut [f32]) -> Result<()> {
         let size = self.description.sample.len_bytes();
-        let length = texels * self.description.texel_len();
-        bytes.resize(length * size, 0);
-        let at = HEAD_LENGTH + (first_texel * self.description.texel_len() * size) as u64;
+        bytes.resize(values.len() * size, 0);
+        let at = HEAD_LENGTH + (first * size) as u64;
         self.file.read_exact_at(bytes, at).map_err(ToolError::io(&self.path))?;
-        let values = &mut values[..length];
         match self.description.sample {
             Sample::Half => {
                 use half::slice::HalfFloatSliceExt as _;
@@ -296,19 +306,11 @@ impl Dataset {
 
     /// The image of one pair of directions: `[y][x][colour]`.
     pub fn image(&self, light: usize, view: usize) -> Result<Vec<[f32; 3]>> {
-        let size = self.description.sample.len_bytes();
-        let mut bytes = [0; 12];
         let pair = view * self.description.lights.len() + light;
-        (0..self.description.texels())
-            .map(|texel| {
-                let at = HEAD_LENGTH + ((texel * self.description.texel_len() + pair * 3) * size) as u64;
-                self.file.read_exact_at(&mut bytes[..3 * size], at).map_err(ToolError::io(&self.path))?;
-                Ok(std::array::from_fn(|c| match self.description.sample {
-                    Sample::Half => half::f16::from_le_bytes([bytes[2 * c], bytes[2 * c + 1]]).to_f32(),
-                    Sample::Float => f32::from_le_bytes(std::array::from_fn(|i| bytes[4 * c + i])),
-                }))
-            })
-            .collect()
+        let mut bytes = Vec::new();
+        let mut rgb = [0.0; 3];
+        let texel = |texel| self.read_pairs(texel, pair, &mut bytes, &mut rgb).map(|()| rgb);
+        (0..self.description.texels()).map(texel).collect()
     }
 
     /// Texels read together by a pass over all of them.

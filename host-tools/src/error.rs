@@ -42,6 +42,9 @@ pub enum ToolError {
         /// What the library said.
         what: String,
     },
+    /// Two materials cannot be compared: their sizes or directions differ.
+    #[error("{0}")]
+    Different(String),
     /// The kernel could not be translated or run.
     #[error("kernel: {0}")]
     Kernel(String),
@@ -61,7 +64,7 @@ impl ToolError {
         match self {
             ToolError::Usage(_) => 1,
             ToolError::Io { .. } | ToolError::Picture { .. } => 2,
-            ToolError::Foreign { .. } | ToolError::Mismatch(_) => 3,
+            ToolError::Foreign { .. } | ToolError::Mismatch(_) | ToolError::Different(_) => 3,
             ToolError::Kernel(_) => 5,
             ToolError::Invalid { finding, .. } => exit_code_of(finding.rule),
         }

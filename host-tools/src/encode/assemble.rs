@@ -1,0 +1,216 @@
+//! From chosen coefficients to the model of a file: used columns, atoms, records and tables.
+
+use super::candidates::Candidates;
+use super::select::Selection;
+use super::{COEFFICIENT_BITS, Options, Prepared};
+use crate::dictionary::Ensemble;
+use crate::error::{Result, ToolError};
+use crate::linear::Basis;
+use crate::model::{AtomModel, ChannelModel, CoefficientsModel, DictionaryModel, EnsembleModel, FactorModel, MaterialModel, MetadataModel, PairTableModel};
+use crate::quantise::{FloatRecord, quantise};
+use crate::transfer::matrix_q13;
+use crate::triangulate::project;
+use selvedge::ensemble::dequantise;
+use selvedge::pair_table::{BASE_BOUND, MEAN_SHIFT_LIMIT};
+
+/// Means of a channel as a file holds them.
+pub type MeanTable = PairTableModel;
+
+/// What the parts of a file are made with.
+pub struct Setting<'a> {
+    /// The data.
+    pub prepared: &'a Prepared<'a>,
+    /// The wish.
+    pub options: &'a Options,
+    /// Magnitude of the least coefficient that is kept; 0 if that is not how they were chosen.
+    pub threshold: f64,
+}
+
+/// Means over the smallest range of 16 bits that holds them, and as the decoder reads them.
+pub fn mean_tables(means: &[Vec<f64>; 3]) -> Result<([MeanTable; 3], [Vec<f32>; 3])> {
+    let mut tables: [MeanTable; 3] = Default::default();
+    let mut decoded: [Vec<f32>; 3] = Default::default();
+    for c in 0..3 {
+        tables[c] = mean_table(means[c].iter().map(|m| m * 1_048_576.0))?;
+        let (base, gain) = (tables[c].base_q20 as f64, 2f64.powi(tables[c].shift as i32));
+        decoded[c] = tables[c].entries.iter().map(|&e| ((base + e as f64 * gain) / 1_048_576.0) as f32).collect();
+    }
+    Ok((tables, decoded))
+}
+
+/// A table of means in Q20.
+pub fn mean_table(q20: impl Iterator<Item = f64>) -> Result<MeanTable> {
+    let q20: Vec<f64> = q20.collect();
+    let (low, high) = q20.iter().fold((f64::MAX, f64::MIN), |(low, high), &q| (low.min(q), high.max(q)));
+    let base = ((low + high) / 2.0).round();
+    let shift = (0..=MEAN_SHIFT_LIMIT).find(|&s| (high - base) / 2f64.powi(s as i32) < 32_767.0);
+    let Some(shift) = shift.filter(|_| base.abs() <= BASE_BOUND as f64) else {
+        return Err(ToolError::Usage(format!("means from {:e} to {:e} are beyond the format", low / 1_048_576.0, high / 1_048_576.0)));
+    };
+    let entries = q20.iter().map(|q| ((q - base) / 2f64.powi(shift as i32)).round().clamp(-32_767.0, 32_767.0) as i16).collect();
+    Ok(PairTableModel { base_q20: base as i32, shift, entries })
+}
+
+/// Columns of a basis that are used, each scaled to its largest entry.
+struct Used {
+    factor: FactorModel,
+    /// New number of each column.
+    number: Vec<u32>,
+    /// Largest entry of each new column.
+    scale: Vec<f64>,
+}
+
+/// Marks a column that is not used.
+const UNUSED: u32 = u32::MAX;
+
+impl Used {
+    fn new(basis: &Basis, used: &[bool]) -> Used {
+        let mut number = vec![UNUSED; basis.columns];
+        let mut scales = Vec::new();
+        let mut columns = Vec::new();
+        for column in (0..basis.columns).filter(|&column| used[column]) {
+            number[column] = columns.len() as u32;
+            // An orthonormal column has an entry that is not zero.
+            let largest = (0..basis.rows).fold(1e-30f64, |largest, row| largest.max((basis.at(row, column) as f64).abs()));
+            columns.push((0..basis.rows).map(|row| (basis.at(row, column) as f64 * 32_767.0 / largest).round() as i16).collect::<Vec<_>>());
+            scales.push(largest);
+        }
+        let entries = (0..basis.rows).flat_map(|row| columns.iter().map(move |column| column[row])).collect();
+        Used { factor: FactorModel { columns: columns.len() as u32, entries }, number, scale: scales }
+    }
+}
+
+/// Entries are Q15 and the largest is 32,767, four times.
+const TABLE_GAIN: f64 = (32_768.0f64 / 32_767.0) * (32_768.0 / 32_767.0) * (32_768.0 / 32_767.0) * (32_768.0 / 32_767.0);
+
+/// The model, and the energy that rounding of the values of level 0 loses.
+pub fn material(setting: &Setting<'_>, ensembles: &[Ensemble; 3], candidates: &[[Candidates; 3]], selections: &[Selection; 3]) -> Result<(MaterialModel, f64)> {
+    let description = setting.prepared.levels[0].description();
+    let mut channels: [ChannelModel; 3] = Default::default();
+    let mut rounding = 0.0;
+    for c in 0..3 {
+        channels[c].mean = Some(setting.prepared.means[c].clone());
+        if selections[c].count > 0 {
+            let of_channel: Vec<&Candidates> = candidates.iter().map(|level| &level[c]).collect();
+            let (ensemble, lost) = channel(setting, &ensembles[c], &of_channel, &selections[c], setting.options.value_bits.map(|bits| bits[c]))?;
+            channels[c].ensemble = Some(ensemble);
+            rounding += lost;
+        }
+    }
+    let same = description.lights == description.views;
+    let model = MaterialModel {
+        size: description.size.map(|n| n as u32),
+        level_count: setting.prepared.levels.len() as u32,
+        edge: setting.options.edge as u32,
+        layer_count: setting.options.layers as u32,
+        transfer: setting.prepared.forward.transfer,
+        cosine_included: description.cosine_included,
+        matrix_q13: matrix_q13(),
+        metadata: MetadataModel { texel_nm: description.texel_nm, frame: 0, image_origin: 0, primaries: 0, texts: description.texts.clone() },
+        lights: description.lights.iter().map(|&d| project(d)).collect(),
+        views: (!same).then(|| description.views.iter().map(|&d| project(d)).collect()),
+        channels,
+        extras: Vec::new(),
+    };
+    Ok((model, rounding))
+}
+
+fn channel(setting: &Setting<'_>, ensemble: &Ensemble, candidates: &[&Candidates], selection: &Selection, bits: Option<u32>) -> Result<(EnsembleModel, f64)> {
+    let (edge, cl, cv) = (ensemble.edge(), ensemble.light.columns, ensemble.view.columns);
+    let split = |place: u32| {
+        let place = place as usize;
+        // [y][x][view][light]
+        [place % cl, place / cl % cv, place / cl / cv % edge, place / cl / cv / edge]
+    };
+    let mut used = vec![[vec![false; cl], vec![false; cv], vec![false; edge], vec![false; edge]]; ensemble.turns.len()];
+    let each = |level: usize| {
+        let candidates = candidates[level];
+        selection.kept[level].iter().enumerate().flat_map(move |(block, list)| list.iter().map(move |&i| (candidates.dictionaries[block] as usize, i as usize)))
+    };
+    for level in 0..candidates.len() {
+        for (k, i) in each(level) {
+            for (flags, column) in used[k].iter_mut().zip(split(candidates[level].places[i])) {
+                flags[column] = true;
+            }
+        }
+    }
+    let mut numbers = vec![usize::MAX; ensemble.turns.len()];
+    let mut dictionaries = Vec::new();
+    let mut tables: Vec<[Used; 4]> = Vec::new();
+    for (k, flags) in used.iter().enumerate().filter(|(_, flags)| flags[0].contains(&true)) {
+        numbers[k] = dictionaries.len();
+        let [light, view] = ensemble.angular(k);
+        let turn = &ensemble.turns[k];
+        let parts = [Used::new(&light, &flags[0]), Used::new(&view, &flags[1]), Used::new(&turn.x, &flags[2]), Used::new(&turn.y, &flags[3])];
+        let [light, view, x, y] = parts.each_ref().map(|part| part.factor.clone());
+        dictionaries.push(DictionaryModel { light, view, x, y });
+        tables.push(parts);
+    }
+    let layers = setting.options.layers;
+    // A layer has what is at least twice as large as what the next one has; the last has the rest.
+    let layer_of = |value: f32| {
+        let above = (value.abs() as f64 / setting.threshold.max(1e-9)).log2().max(0.0) as usize;
+        (layers - 1).saturating_sub(above)
+    };
+    let mut records: Vec<Vec<Vec<FloatRecord>>> = Vec::new();
+    for (level, candidates) in candidates.iter().enumerate() {
+        let mut of_layers: Vec<Vec<FloatRecord>> = vec![Vec::with_capacity(candidates.dictionaries.len()); layers];
+        for (block, list) in selection.kept[level].iter().enumerate() {
+            let k = candidates.dictionaries[block] as usize;
+            let number = numbers[k];
+            let mut lists: Vec<Vec<(AtomModel, f64)>> = vec![Vec::new(); layers];
+            for &i in list {
+                let [light, view, x, y] = split(candidates.places[i as usize]);
+                let [of_light, of_view, of_x, of_y] = &tables[number];
+                let atom =
+                    AtomModel { light: of_light.number[light], view: of_view.number[view], x: of_x.number[x], y: of_y.number[y], ..AtomModel::default() };
+                let scale = of_light.scale[atom.light as usize] * of_view.scale[atom.view as usize] * of_x.scale[atom.x as usize] * of_y.scale[atom.y as usize];
+                let value = candidates.values[i as usize];
+                lists[layer_of(value)].push((atom, value as f64 * scale * TABLE_GAIN));
+            }
+            for (records, list) in of_layers.iter_mut().zip(lists) {
+                records.push((if list.is_empty() { 0 } else { number }, list));
+            }
+        }
+        records.push(of_layers);
+    }
+    let quantised = |bits: u32| -> Result<(EnsembleModel, f64)> {
+        let (atoms, coefficients) = quantise(&records, dictionaries.len(), &vec![vec![bits; layers]; candidates.len()])?;
+        let lost = records[0].iter().zip(&coefficients[0]).map(|(records, coefficients)| rounding(records, coefficients, &atoms, &tables)).sum();
+        Ok((EnsembleModel { dictionaries: dictionaries.clone(), atoms, coefficients }, lost))
+    };
+    if let Some(bits) = bits {
+        return quantised(bits);
+    }
+    // A bit more for every value costs its price, and takes three quarters of the rounding away.
+    let (model, lost) = quantised(FIRST_BITS)?;
+    let price = setting.threshold.powi(2) / COEFFICIENT_BITS * selection.count as f64;
+    let loss = |bits: u32| lost * 4f64.powi(FIRST_BITS as i32 - bits as i32) + price * bits as f64;
+    match (3..=14).min_by(|&a, &b| loss(a).total_cmp(&loss(b))) {
+        Some(bits) if bits != FIRST_BITS => quantised(bits),
+        _ => Ok((model, lost)),
+    }
+}
+
+/// Bits of a value to begin with.
+const FIRST_BITS: u32 = 7;
+
+/// Energy that the rounding of values loses in a layer, for orthonormal columns.
+fn rounding(records: &[FloatRecord], coefficients: &CoefficientsModel, atoms: &[Vec<AtomModel>], tables: &[[Used; 4]]) -> f64 {
+    let mut lost = 0.0;
+    let mut wanted: Vec<(u32, f64)> = Vec::new();
+    for ((number, floats), record) in records.iter().zip(&coefficients.records) {
+        wanted.clear();
+        wanted.extend(floats.iter().map(|(atom, value)| (atom.word(), *value)));
+        wanted.sort_unstable_by_key(|entry| entry.0);
+        let unit = 2f64.powi(record.shift as i32 + 5);
+        for (&(_, value), &(place, quantised)) in wanted.iter().zip(&record.coefficients) {
+            let atom = atoms[*number][place as usize];
+            let [light, view, x, y] = &tables[*number];
+            let scale = light.scale[atom.light as usize] * view.scale[atom.view as usize] * x.scale[atom.x as usize] * y.scale[atom.y as usize];
+            let decoded = dequantise(atom.quantiser(), quantised as u32, coefficients.value_bits) as f64 / unit / 2f64.powi(atom.shift as i32);
+            lost += ((decoded - value) / scale).powi(2);
+        }
+    }
+    lost
+}

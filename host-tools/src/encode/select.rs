@@ -1,0 +1,141 @@
+//! Which candidates a file keeps: those that are worth their bits, and the atoms and columns that are worth theirs.
+//!
+//! A coefficient is kept if its square is above that of a threshold: for orthonormal dictionaries its square is
+//! the error that leaving it out makes. The threshold sets the price of a bit. At that price an atom has to pay
+//! for its two words, and a column of a factor for its rows; what does not pay goes, until all that is left does.
+
+use super::candidates::Candidates;
+use crate::dictionary::Ensemble;
+
+/// Bits of an atom's two words (10.2).
+const ATOM_BITS: f64 = 64.0;
+
+/// What a selection costs and leaves, beside the lists themselves.
+#[derive(Clone, Debug, Default)]
+pub struct Selection {
+    /// `kept[level][block]`: indices into the candidates, ascending.
+    pub kept: Vec<Vec<Vec<u32>>>,
+    /// Energy of what is not kept, over all levels.
+    pub lost: f64,
+    /// Energy of level 0 that is not kept.
+    pub lost_at_0: f64,
+    /// Coefficients.
+    pub count: usize,
+}
+
+/// Candidates of one channel at all levels, with their atoms numbered.
+pub struct Channel<'a> {
+    levels: Vec<&'a Candidates>,
+    /// Number of the atom of each candidate.
+    atoms: Vec<Vec<u32>>,
+    /// Dictionary and place of each atom.
+    keys: Vec<(u16, u32)>,
+    columns: [usize; 2],
+    rows: [usize; 2],
+    dictionaries: usize,
+}
+
+impl<'a> Channel<'a> {
+    /// Numbers the atoms.
+    pub fn new(levels: Vec<&'a Candidates>, ensemble: &Ensemble) -> Channel<'a> {
+        let key_of = |candidates: &Candidates, block: usize, i: usize| (candidates.dictionaries[block], candidates.places[i]);
+        let all = |candidates: &'a Candidates| {
+            (0..candidates.dictionaries.len()).flat_map(move |b| (candidates.starts[b]..candidates.starts[b + 1]).map(move |i| key_of(candidates, b, i)))
+        };
+        let mut keys: Vec<(u16, u32)> = Vec::new();
+        for candidates in &levels {
+            keys.extend(all(candidates));
+            // In between, so that the list stays short.
+            keys.sort_unstable();
+            keys.dedup();
+        }
+        let number = |key: (u16, u32)| keys.partition_point(|&k| k < key) as u32;
+        let atoms = levels.iter().map(|candidates| all(candidates).map(number).collect()).collect();
+        Channel {
+            levels,
+            atoms,
+            columns: [ensemble.light.columns, ensemble.view.columns],
+            rows: [ensemble.light.rows, ensemble.view.rows],
+            dictionaries: ensemble.turns.len(),
+            keys,
+        }
+    }
+
+    /// Chooses at a threshold; `bits` is what a coefficient costs, `most` the largest record that is allowed.
+    pub fn select(&self, threshold: f32, bits: f64, most: usize) -> Selection {
+        let square = (threshold as f64).powi(2);
+        let price = square / bits;
+        let mut gains = vec![0.0f64; self.keys.len()];
+        for (candidates, atoms) in self.levels.iter().zip(&self.atoms) {
+            for (&value, &atom) in candidates.values.iter().zip(atoms) {
+                if value.abs() >= threshold {
+                    gains[atom as usize] += (value as f64).powi(2) - square;
+                }
+            }
+        }
+        let mut alive: Vec<bool> = gains.iter().map(|&gain| gain > price * ATOM_BITS).collect();
+        let columns_of = |key: (u16, u32)| {
+            let (light, view) = (key.1 as usize % self.columns[0], key.1 as usize / self.columns[0] % self.columns[1]);
+            (key.0 as usize * self.columns[0] + light, key.0 as usize * self.columns[1] + view)
+        };
+        // Dropping a column takes atoms with it, which may leave another column too little.
+        loop {
+            let mut of_lights = vec![0.0; self.dictionaries * self.columns[0]];
+            let mut of_views = vec![0.0; self.dictionaries * self.columns[1]];
+            for ((key, gain), _) in self.keys.iter().zip(&gains).zip(&alive).filter(|(_, alive)| **alive) {
+                let (light, view) = columns_of(*key);
+                of_lights[light] += gain - price * ATOM_BITS;
+                of_views[view] += gain - price * ATOM_BITS;
+            }
+            let pays = |gain: f64, rows: usize| gain > price * 16.0 * rows as f64;
+            let mut changed = false;
+            for (key, alive) in self.keys.iter().zip(&mut alive).filter(|(_, alive)| **alive) {
+                let (light, view) = columns_of(*key);
+                if !pays(of_lights[light], self.rows[0]) || !pays(of_views[view], self.rows[1]) {
+                    *alive = false;
+                    changed = true;
+                }
+            }
+            if !changed {
+                break;
+            }
+        }
+        self.keep(|value, atom| value.abs() >= threshold && alive[atom], most)
+    }
+
+    /// Every candidate.
+    pub fn all(&self) -> Selection {
+        self.keep(|_, _| true, usize::MAX)
+    }
+
+    fn keep(&self, keep: impl Fn(f32, usize) -> bool, most: usize) -> Selection {
+        let mut selection = Selection::default();
+        for (level, (candidates, atoms)) in self.levels.iter().zip(&self.atoms).enumerate() {
+            let mut blocks = Vec::with_capacity(candidates.dictionaries.len());
+            let mut kept_energy = 0.0;
+            for range in candidates.starts.windows(2) {
+                let mut list: Vec<u32> = (range[0]..range[1]).filter(|&i| keep(candidates.values[i], atoms[i] as usize)).map(|i| i as u32).collect();
+                if list.len() > most {
+                    list.sort_by(|&a, &b| candidates.values[b as usize].abs().total_cmp(&candidates.values[a as usize].abs()).then(a.cmp(&b)));
+                    list.truncate(most);
+                    list.sort_unstable();
+                }
+                kept_energy += list.iter().map(|&i| (candidates.values[i as usize] as f64).powi(2)).sum::<f64>();
+                selection.count += list.len();
+                blocks.push(list);
+            }
+            let lost = (candidates.energy - kept_energy).max(0.0);
+            selection.lost += lost;
+            if level == 0 {
+                selection.lost_at_0 = lost;
+            }
+            selection.kept.push(blocks);
+        }
+        selection
+    }
+
+    /// Largest record of a selection.
+    pub fn largest_record(selection: &Selection) -> usize {
+        selection.kept.iter().flatten().map(Vec::len).max().unwrap_or(0)
+    }
+}

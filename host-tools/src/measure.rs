@@ -1,0 +1,195 @@
+//! How far two materials are apart: what `compare` prints and what an encoder verifies its goal by.
+//!
+//! Errors are of linear radiance and of `ln(x + e)`, where `e` is one thousandth of the reference's mean, the same for
+//! everything that is compared with that reference. Files are decoded by the core, at the directions of the reference.
+
+use crate::dataset::{Dataset, Description};
+use crate::error::{Result, ToolError};
+use crate::linear::ordered;
+use crate::transfer::log2;
+use crate::triangulate::project;
+use selvedge::direction_set::cosine_of;
+use selvedge::{Direction, Rgb, Selvedge};
+use serde::Serialize;
+use std::f64::consts::LN_2;
+
+/// One material to be compared: radiance at texels and pairs of directions.
+#[derive(Clone, Copy)]
+pub enum Source<'a> {
+    /// Data.
+    Data(&'a Dataset),
+    /// A file, decoded by the core at a level of detail.
+    File(&'a Selvedge<'a>, u32),
+}
+
+/// Largest difference and where it is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Place {
+    /// Magnitude.
+    pub difference: f32,
+    /// Texel along x and y.
+    pub texel: [usize; 2],
+    /// Light and view direction.
+    pub light: usize,
+    /// View direction.
+    pub view: usize,
+}
+
+/// Metrics over all texels, pairs and colours.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Metrics {
+    /// Numbers compared.
+    pub count: u64,
+    /// Numbers that differ at all.
+    pub different: u64,
+    /// Root mean squared error of `ln(x + offset)`.
+    pub log_rms: f64,
+    /// The offset.
+    pub log_offset: f32,
+    /// Root mean squared error of linear radiance.
+    pub linear_rms: f64,
+    /// Root of the squared error over the squared reference.
+    pub relative_l2: f64,
+    /// Peak signal to noise ratio, decibels, of linear radiance.
+    pub psnr_db: f64,
+    /// The peak it is stated against.
+    pub peak: f64,
+    /// The largest difference.
+    pub largest: Place,
+}
+
+/// Sums of one part.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    count: u64,
+    different: u64,
+    log: f64,
+    linear: f64,
+    reference: f64,
+    largest: Place,
+}
+
+/// Images held at once, in numbers.
+const BUDGET: usize = 1 << 23;
+
+/// A sample direction as a query: the point that an encoder writes for it (5.1-4).
+pub fn query(direction: glam::DVec3) -> Direction {
+    let [x, y] = project(direction);
+    Direction { x_q18: x << 4, y_q18: y << 4, z_q15: cosine_of(x, y) as i32 }
+}
+
+/// Radiance of a source at one view and a range of lights: `[light][texel]`.
+fn images(source: Source<'_>, description: &Description, view: usize, lights: std::ops::Range<usize>, out: &mut Vec<[f32; 3]>) -> Result<()> {
+    let texels = description.texels();
+    out.resize(texels * lights.len(), [0.0; 3]);
+    match source {
+        Source::Data(dataset) => {
+            let mut bytes = Vec::new();
+            let mut run = vec![0.0; lights.len() * 3];
+            for texel in 0..texels {
+                dataset.read_pairs(texel, view * description.lights.len() + lights.start, &mut bytes, &mut run)?;
+                run.as_chunks::<3>().0.iter().enumerate().for_each(|(i, rgb)| out[i * texels + texel] = *rgb);
+            }
+        }
+        Source::File(file, level) => {
+            let mut scratch = vec![0; file.image_scratch_len()];
+            let mut image = vec![Rgb::default(); texels];
+            let view = query(description.views[view]);
+            for (i, light) in lights.enumerate() {
+                let light = query(description.lights[light]);
+                file.decode_image(level, light, view, &mut scratch, &mut image).expect("the buffers are as long as asked for");
+                out[i * texels..][..texels].iter_mut().zip(&image).for_each(|(out, rgb)| *out = rgb.to_f32());
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Compares a material with a reference, over all texels and pairs of `description`, which is that of the reference.
+///
+/// `peak` is that of the PSNR; the reference's largest value if `None`.
+///
+/// # Errors
+/// If the sizes differ or data cannot be read.
+pub fn compare(
+    reference: Source<'_>,
+    other: Source<'_>,
+    description: &Description,
+    log_offset: f32,
+    peak: Option<f64>,
+    progress: &dyn Fn(usize, usize),
+) -> Result<Metrics> {
+    for source in [reference, other] {
+        let size = match source {
+            Source::Data(dataset) => {
+                let own = dataset.description();
+                if (own.lights.len(), own.views.len()) != (description.lights.len(), description.views.len()) {
+                    return Err(ToolError::Different(format!("{}: other directions than those of the reference", dataset.path().display())));
+                }
+                own.size
+            }
+            Source::File(file, level) => file.image_size(level).map(|n| n as usize),
+        };
+        if size != description.size {
+            let [a, b] = [size, description.size].map(|[x, y]| format!("{x} x {y}"));
+            return Err(ToolError::Different(format!("{a} texels where the reference has {b}")));
+        }
+    }
+    let (texels, lights) = (description.texels(), description.lights.len());
+    let at_once = (BUDGET / 6 / texels).clamp(1, lights);
+    let chunks = lights.div_ceil(at_once);
+    let parts = description.views.len() * chunks;
+    let work = |part: usize| -> Result<(Sums, f32)> {
+        let (view, first) = (part / chunks, part % chunks * at_once);
+        let range = first..(first + at_once).min(lights);
+        let (mut a, mut b) = (Vec::new(), Vec::new());
+        images(reference, description, view, range.clone(), &mut a)?;
+        images(other, description, view, range, &mut b)?;
+        let mut sums = Sums::default();
+        let mut peak = 0.0f32;
+        for (i, (a, b)) in a.iter().zip(&b).enumerate() {
+            for (&a, &b) in a.iter().zip(b) {
+                let difference = b - a;
+                sums.count += 1;
+                sums.different += u64::from(a.to_bits() != b.to_bits());
+                sums.log += (log2(b + log_offset) as f64 - log2(a + log_offset) as f64).powi(2);
+                sums.linear += (difference as f64).powi(2);
+                sums.reference += (a as f64).powi(2);
+                peak = peak.max(a);
+                // The first of equal ones, and what is no number.
+                if difference.abs() > sums.largest.difference || difference.is_nan() {
+                    let texel = i % texels;
+                    let place = [texel % description.size[0], texel / description.size[0]];
+                    sums.largest = Place { difference: difference.abs(), texel: place, light: first + i / texels, view };
+                }
+            }
+        }
+        Ok((sums, peak))
+    };
+    let (sums, found_peak) = ordered(parts, work, (Sums::default(), 0.0f32), |(total, peak), part, (sums, part_peak)| {
+        total.count += sums.count;
+        total.different += sums.different;
+        total.log += sums.log;
+        total.linear += sums.linear;
+        total.reference += sums.reference;
+        if sums.largest.difference > total.largest.difference {
+            total.largest = sums.largest;
+        }
+        *peak = peak.max(part_peak);
+        progress(part + 1, parts);
+    })?;
+    let count = sums.count as f64;
+    let peak = peak.unwrap_or(found_peak as f64);
+    let relative = if sums.reference > 0.0 { (sums.linear / sums.reference).sqrt() } else { sums.linear.sqrt() };
+    Ok(Metrics {
+        count: sums.count,
+        different: sums.different,
+        log_rms: LN_2 * (sums.log / count).sqrt(),
+        log_offset,
+        linear_rms: (sums.linear / count).sqrt(),
+        relative_l2: relative,
+        psnr_db: 10.0 * (peak * peak / (sums.linear / count)).log10(),
+        peak,
+        largest: sums.largest,
+    })
+}
