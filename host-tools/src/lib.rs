@@ -31,6 +31,7 @@ pub mod picture;
 pub mod quantise;
 pub mod random;
 pub mod sparsebtf;
+pub mod synth;
 pub mod transfer;
 pub mod triangulate;
 pub mod write;
