@@ -8,7 +8,7 @@ use crate::colour::{Rgb, Values};
 use crate::direction::{
     Direction, Taps, beyond_hull, clamp_direction, coarse_q14, cross, dot_product, grid_cell, grid_start, hull_start, point, ratio_q15, refine, triangles_start,
 };
-use crate::ensemble::Record;
+use crate::ensemble::{RECORD_BOUND, Record};
 use crate::fixed::{HALF_Q15, ONE_Q15, clamp_magnitude, multiply_q15, round_shift};
 use crate::interpolation::{VALUE_BOUND, radiance, scale_texture};
 use crate::material::{CHANNEL_FULL, CHANNEL_MISSING, Channel};
@@ -351,7 +351,7 @@ impl Selvedge<'_> {
             let total = sum_lanes(coefficients, light_lanes, view_lanes, |x| blend_spans(spatial[0], &x_spans, x), |y| blend_spans(spatial[1], &y_spans, y));
             for (textures, total) in textures.iter_mut().zip(total) {
                 if let Some(sum) = textures.get_mut(number) {
-                    *sum = sum.wrapping_add(round_shift(total, record.shift));
+                    *sum = sum.wrapping_add(clamp_magnitude(round_shift(total, record.shift), RECORD_BOUND));
                 }
             }
         }

@@ -5,15 +5,15 @@
 //! first and evaluates once (equation 6), in an order of products that lets work be shared.
 
 use crate::direction::Taps;
-use crate::fixed::{HALF_Q15, multiply_q15, round_shift};
+use crate::fixed::{HALF_Q15, clamp_magnitude, multiply_q15, round_shift};
 use crate::material::{Channel, Material, level_size};
 use crate::position::{Axis, Span, block_count};
 use crate::words::{Words, bit_window, packed_i16, word};
 
-/// Added to the stored five bits to give a record's shift (10.4-3).
-pub const SHIFT_BIAS: u32 = 5;
-/// Bits of a record's shift.
+/// Bits of a record's shift (10.4-3).
 pub const SHIFT_BITS: u32 = 5;
+/// The texture of a record is limited to this magnitude, Q20: 32 (10.7-4).
+pub const RECORD_BOUND: i32 = 0x0200_0000;
 /// Bits that hold the number of low position bits.
 pub const LOW_BITS_BITS: u32 = 4;
 
@@ -66,7 +66,7 @@ pub fn read_record(words: Words<'_>, start: u32, block: u32) -> Record {
     let window = bit_window(words, stream, bit);
     let count = low_part(window, count_bits);
     let dictionary = low_part(window >> count_bits, dictionary_bits);
-    let shift = low_part(window >> count_bits.wrapping_add(dictionary_bits), SHIFT_BITS).wrapping_add(SHIFT_BIAS);
+    let shift = low_part(window >> count_bits.wrapping_add(dictionary_bits), SHIFT_BITS);
     let low_bits = (window >> count_bits.wrapping_add(dictionary_bits).wrapping_add(SHIFT_BITS)) & 0xf;
     let fields_bit = bit.wrapping_add(count_bits).wrapping_add(dictionary_bits).wrapping_add(SHIFT_BITS).wrapping_add(LOW_BITS_BITS);
     let highs_bit = fields_bit.wrapping_add(count.wrapping_mul(low_bits.wrapping_add(value_bits)));
@@ -185,8 +185,8 @@ pub fn record_q20(words: Words<'_>, channel: Channel, record: Record, x: Span, y
     }
     sum_y = sum_y.wrapping_add(multiply_q15(sum_xy, blend_span(words, x_table, x_row_words, x, column_x)));
     total = total.wrapping_add(multiply_q15(sum_y, blend_span(words, y_table, y_row_words, y, column_y)));
-    // 10.7-4: to Q20.
-    round_shift(total, record.shift)
+    // 10.7-4: to Q20, limited so that four blocks of eight layers stay within 2^30.
+    clamp_magnitude(round_shift(total, record.shift), RECORD_BOUND)
 }
 
 /// The texture of one block, all layers, Q20 (10.7-5).

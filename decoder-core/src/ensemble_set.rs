@@ -3,7 +3,7 @@
 use crate::check::{Check, Section};
 use crate::cost::record_operations;
 use crate::directory::{ANGULAR, ATOMS, COEFFICIENTS, SPATIAL, find_section};
-use crate::ensemble::{LOW_BITS_BITS, SHIFT_BIAS, SHIFT_BITS};
+use crate::ensemble::{LOW_BITS_BITS, SHIFT_BITS};
 use crate::error::Rule;
 use crate::header::Header;
 use crate::material::{Material, level_size};
@@ -302,7 +302,7 @@ fn check_record(check: &mut Check<'_, '_>, stream: &Stream<'_>, bit: u32, stream
         return Some((fields as u32, 0));
     }
     let dictionaries = check.word_at(atoms.offset);
-    let good = dictionary < dictionaries && shift <= 31 - SHIFT_BIAS && low_bits <= LOW_BITS_LIMIT;
+    let good = dictionary < dictionaries && low_bits <= LOW_BITS_LIMIT;
     if !check.ensure(good, Rule::RecordHeader, at, head as u32) {
         return None;
     }

@@ -6,7 +6,7 @@
 
 use crate::colour::{Rgb, Values};
 use crate::direction::{Direction, Taps};
-use crate::ensemble::Record;
+use crate::ensemble::{RECORD_BOUND, Record};
 use crate::fixed::{HALF_Q15, clamp_magnitude, multiply_q15, round_shift};
 use crate::interpolation::{VALUE_BOUND, mean_q20, radiance, scale_q15, scale_texture};
 use crate::material::{CHANNEL_FULL, CHANNEL_MISSING, Channel, level_size};
@@ -226,7 +226,7 @@ impl Selvedge<'_> {
         close_y(&mut total, &mut sum_y, spatial);
         for (sums, total) in sums.iter_mut().zip(&total) {
             for (sum, total) in sums.iter_mut().zip(total) {
-                *sum = sum.wrapping_add(round_shift(*total, record.shift));
+                *sum = sum.wrapping_add(clamp_magnitude(round_shift(*total, record.shift), RECORD_BOUND));
             }
         }
     }

@@ -16,7 +16,7 @@ pub fn example_model() -> MaterialModel {
     };
     let atom = |x: u32, light: u32, shift: u32, base: i16, step: u16| AtomModel { light, view: 0, x, y: 0, shift, base, step };
     let record = |coefficients: &[(u32, u16)]| RecordModel { dictionary: 0, shift: 8, coefficients: coefficients.to_vec() };
-    let empty = RecordModel { shift: 5, ..RecordModel::default() };
+    let empty = RecordModel::default();
     let ensemble = EnsembleModel {
         dictionaries: vec![dictionary],
         atoms: vec![vec![atom(0, 0, 0, -16000, 32000), atom(0, 1, 2, -8000, 16000), atom(1, 0, 3, 0, 32767)]],

@@ -161,7 +161,7 @@ fn extreme_record(r: &mut Random, atoms: &[Vec<AtomModel>], value_bits: u32) -> 
     let dictionary = r.range(0, atoms.len() as i64 - 1) as u32;
     let list = &atoms[dictionary as usize];
     if r.once_in(6) || list.is_empty() {
-        return RecordModel { shift: 5, ..RecordModel::default() };
+        return RecordModel::default();
     }
     let keep = r.pick(&[1, 1, 2, 9]);
     let most = (1u32 << value_bits) - 1;
@@ -176,7 +176,7 @@ fn extreme_record(r: &mut Random, atoms: &[Vec<AtomModel>], value_bits: u32) -> 
         }
     }
     if coefficients.is_empty() {
-        return RecordModel { shift: 5, ..RecordModel::default() };
+        return RecordModel::default();
     }
-    RecordModel { dictionary, shift: r.pick(&[5, 31, r.clone().range(5, 31) as u32]), coefficients }
+    RecordModel { dictionary, shift: r.pick(&[0, 31, r.clone().range(0, 31) as u32]), coefficients }
 }

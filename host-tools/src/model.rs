@@ -180,7 +180,7 @@ pub struct CoefficientsModel {
 pub struct RecordModel {
     /// Which dictionary.
     pub dictionary: u32,
-    /// Right shift of the result, 5 to 31.
+    /// Right shift of the result, 0 to 31; 0 without coefficients.
     pub shift: u32,
     /// Positions in the list of atoms, ascending, with their values.
     pub coefficients: Vec<(u32, u16)>,

@@ -20,7 +20,7 @@ pub type FloatRecord = (usize, Vec<(AtomModel, f64)>);
 pub type Quantised = (Vec<Vec<AtomModel>>, Vec<Vec<CoefficientsModel>>);
 
 /// Finest and coarsest shift of a record that are used (10.4-3).
-const SHIFTS: std::ops::RangeInclusive<u32> = 5..=26;
+const SHIFTS: std::ops::RangeInclusive<u32> = 0..=26;
 /// Largest magnitude of a coefficient, with room for the rounding of base and step (10.5-7).
 const LARGEST: f64 = 32_000.0;
 
@@ -45,8 +45,8 @@ fn unit(shift: u32) -> f64 {
 ///
 /// # Errors
 /// [`ToolError::Usage`] if a record names a dictionary that is not there or an atom twice, if a dictionary
-/// would have more than 65,536 atoms, or if coefficients are too large for the format: 31 for one, or 63
-/// for the sum of a record's magnitudes.
+/// would have more than 65,536 atoms, or if coefficients are too large for the format: 1,000 for one, or
+/// 2,046 for the sum of a record's magnitudes.
 pub fn quantise(records: &[Vec<Vec<FloatRecord>>], dictionaries: usize, value_bits: &[Vec<u32>]) -> Result<Quantised> {
     let keys = atom_keys(records, dictionaries)?;
     // Atoms are numbered through all dictionaries; `starts` has the first of each.
@@ -146,7 +146,7 @@ impl<'a> Group<'a> {
             }
         }
         let fits = |shift: u32| largest_sum * unit(shift) < 65_000.0 && largest * unit(shift) < LARGEST;
-        let finest = SHIFTS.rev().find(|&shift| fits(shift)).or((largest_sum < 64.0 && largest < 31.25).then_some(*SHIFTS.start()));
+        let finest = SHIFTS.rev().find(|&shift| fits(shift)).or((largest_sum < 2047.0 && largest < 1000.0).then_some(*SHIFTS.start()));
         match finest {
             Some(finest) => Ok(Group { records, atoms, value_bits, finest }),
             None => Err(ToolError::Usage(format!("coefficients of up to {largest} that sum to {largest_sum} are beyond the format"))),
@@ -223,7 +223,7 @@ fn quantise_group(group: &Group<'_>, atoms: &[AtomModel], starts: &[usize], shif
     let mut records = Vec::with_capacity(group.records.len());
     for (dictionary, list) in group.records {
         if list.is_empty() {
-            records.push(RecordModel { dictionary: 0, shift: *SHIFTS.start(), coefficients: Vec::new() });
+            records.push(RecordModel::default());
             continue;
         }
         let mut sum = 0;

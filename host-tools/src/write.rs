@@ -6,7 +6,7 @@ use selvedge::cost::{Shape, filtered_operations, record_operations};
 use selvedge::direction::{cross, dot_product};
 use selvedge::direction_set::{cosine_of, reciprocal_of};
 use selvedge::directory::{ANGULAR, ATOMS, COEFFICIENTS, DIRECTIONS, EXTERNAL, MEANS, METADATA, SCALES, SPATIAL};
-use selvedge::ensemble::{LOW_BITS_BITS, SHIFT_BIAS, SHIFT_BITS};
+use selvedge::ensemble::{LOW_BITS_BITS, SHIFT_BITS};
 use selvedge::ensemble_set::LOW_BITS_LIMIT;
 use selvedge::header::{CONTENT_DICTIONARY, CONTENT_MATERIAL, HEADER_LENGTH, MAGIC, METHOD_SPARSE_ENSEMBLE};
 use selvedge::{crc32, sha256};
@@ -313,7 +313,7 @@ fn coefficients_bytes(coefficients: &CoefficientsModel, dictionaries: u32, large
         }
         let low_bits = best_low_bits(list.iter().map(|c| c.0));
         stream.push(record.dictionary, dictionary_bits);
-        stream.push(record.shift - SHIFT_BIAS, SHIFT_BITS);
+        stream.push(record.shift, SHIFT_BITS);
         stream.push(low_bits, LOW_BITS_BITS);
         for &(position, value) in list {
             stream.push(position, low_bits);

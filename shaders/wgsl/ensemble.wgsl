@@ -4,10 +4,10 @@
 // products of one column of each of four factor matrices. A sample blends the rows of the factors
 // first and evaluates once (equation 6), in an order of products that lets work be shared.
 
-// Added to the stored five bits to give a record's shift (10.4-3).
-const SHIFT_BIAS: u32 = 5u;
-// Bits of a record's shift.
+// Bits of a record's shift (10.4-3).
 const SHIFT_BITS: u32 = 5u;
+// The texture of a record is limited to this magnitude, Q20: 32 (10.7-4).
+const RECORD_BOUND: i32 = 0x02000000i;
 // Bits that hold the number of low position bits.
 const LOW_BITS_BITS: u32 = 4u;
 
@@ -50,7 +50,7 @@ fn read_record(start: u32, block: u32) -> Record {
     let window = bit_window(stream, bit);
     let count = low_part(window, count_bits);
     let dictionary = low_part(window >> count_bits, dictionary_bits);
-    let shift = low_part(window >> (count_bits + dictionary_bits), SHIFT_BITS) + SHIFT_BIAS;
+    let shift = low_part(window >> (count_bits + dictionary_bits), SHIFT_BITS);
     let low_bits = (window >> (count_bits + dictionary_bits + SHIFT_BITS)) & 0xfu;
     let fields_bit = bit + count_bits + dictionary_bits + SHIFT_BITS + LOW_BITS_BITS;
     let highs_bit = fields_bit + count * (low_bits + value_bits);
@@ -164,8 +164,8 @@ fn record_q20(channel: Channel, record: Record, x: Span, y: Span, light: Taps, v
     }
     sum_y += multiply_q15(sum_xy, blend_span(x_table, x_row_words, x, column_x));
     total += multiply_q15(sum_y, blend_span(y_table, y_row_words, y, column_y));
-    // 10.7-4: to Q20.
-    return round_shift(total, record.shift);
+    // 10.7-4: to Q20, limited so that four blocks of eight layers stay within 2^30.
+    return clamp_magnitude(round_shift(total, record.shift), RECORD_BOUND);
 }
 
 // The texture of one block, all layers, Q20 (10.7-5).

@@ -133,7 +133,7 @@ fn cases() -> Vec<Case> {
         Case::patch_in(Rule::CoefficientsHeader, 0x113, 0, 0, 0x0002_0011),
         Case::patch_in(Rule::LargestCount, 0x113, 0, 3, 3),
         Case::patch_in(Rule::RecordPlace, 0x113, 0, 5, 24),
-        Case::patch_in(Rule::RecordHeader, 0x113, 0, 6, word(&good, at(0x113, 0) + 24) | 31 << 2),
+        many_low_bits(),
         Case::patch_in(Rule::StreamEnd, 0x113, 0, 7, word(&good, at(0x113, 0) + 28) | 1 << 31),
         Case::resize(Rule::MetadataText, 1, 0, |bytes| bytes[36] = 0xff),
         Case::resize(Rule::DirectionsLength, 3, 0, |bytes| bytes.extend([0; 4])),
@@ -244,7 +244,7 @@ fn many_zeros() -> Case {
     ensemble.atoms[0] = (0..100).map(|view| AtomModel { view, step: 9, ..AtomModel::default() }).collect();
     ensemble.coefficients[0][0].records.iter_mut().for_each(|record| record.coefficients = vec![(99, 0)]);
     let (header, mut parts) = take_apart(&write_material(&model));
-    // Count 1, shift 5 + 3, no low bits, a value of four bits: 14 bits, then the high part.
+    // Count 1, shift 3, no low bits, a value of four bits: 14 bits, then the high part.
     let record = 1u128 | 3 << 1 | 1 << (14 + 99);
     let words = [4 | 1 << 16, 2, 228, 1, 0, 114];
     let stream: Vec<u8> = (0..2).fold(vec![0u8; 32], |mut stream, i| {
@@ -253,6 +253,17 @@ fn many_zeros() -> Case {
     });
     parts.iter_mut().find(|p| p.kind == 0x113).expect("there").bytes = [words_to_bytes(&words), stream].concat();
     Case::new(Rule::RecordZeros, lay_out(header, parts), None)
+}
+
+/// The example with records of 13 low bits, one more than there may be.
+fn many_low_bits() -> Case {
+    let (header, mut parts) = take_apart(&example());
+    // Count 1 of two bits, shift 0, 13 low bits, all of them and a value of four bits zero, then a one: 29 bits.
+    let record = 1u64 | 13 << 7 | 1 << 28;
+    let words = [4 | 2 << 16, 2, 58, 2, 0, 29];
+    let stream = (record | record << 29).to_le_bytes().to_vec();
+    parts.iter_mut().find(|p| p.kind == 0x113).expect("there").bytes = [words_to_bytes(&words), stream].concat();
+    Case::new(Rule::RecordHeader, lay_out(header, parts), None)
 }
 
 /// The example with tables for three directions.
