@@ -24,5 +24,6 @@ pub mod model;
 pub mod picture;
 pub mod random;
 pub mod sparsebtf;
+pub mod synth;
 pub mod triangulate;
 pub mod write;
