@@ -13,6 +13,9 @@
 //! A tile is the unit square and less than 0.09 high. A texel is a square of the plane halfway up; a viewer
 //! sees it where rays through the stratified points of that square meet the surface. Texel rows ascend with y of
 //! the tangent frame. Nothing is random but the geometry: equal requests give equal bytes, whatever the threads.
+//!
+//! What is left out: specular light between surfaces, light through yarns, and hairs. Highlights are those of
+//! the rays of a texel, without a filter over its area; more rays make textures finer than a texel calmer.
 
 pub mod mesh;
 pub mod noise;
@@ -154,16 +157,23 @@ fn write_texels(mesh: mesh::Mesh, writer: &Writer, strata: usize, progress: &(dy
     })
 }
 
+/// A point of the unit square in each of `strata` x `strata` cells, no two in one row or column: edges along
+/// the axes, which weaves are full of, get as many steps as there are points.
+fn stratified(index: usize, strata: usize) -> [f32; 2] {
+    let (i, j, n) = (index % strata, index / strata, strata as f32);
+    [(i as f32 + (j as f32 + 0.5) / n) / n, (j as f32 + ((strata - 1 - i) as f32 + 0.5) / n) / n]
+}
+
 /// Radiance of one texel: `[view][light][colour]`.
 fn texel_values(scene: &shade::Scene, views: &[Vec3A], size: [usize; 2], texel: usize, strata: usize) -> Vec<f32> {
     let of_view = scene.lights() * 3;
     let mut values = vec![0.0; views.len() * of_view];
     let weight = 1.0 / (strata * strata) as f32;
-    let at = |cell: usize, stratum: usize, count: usize| (cell as f32 + (stratum as f32 + 0.5) / strata as f32) / count as f32;
+    let at = |cell: usize, part: f32, count: usize| (cell as f32 + part) / count as f32;
     for (&view, sums) in views.iter().zip(values.chunks_exact_mut(of_view)) {
         for stratum in 0..strata * strata {
-            let (x, y) = (at(texel % size[0], stratum % strata, size[0]), at(texel / size[0], stratum / strata, size[1]));
-            scene.add_radiance(x, y, view, weight, sums);
+            let [u, v] = stratified(stratum, strata);
+            scene.add_radiance(at(texel % size[0], u, size[0]), at(texel / size[0], v, size[1]), view, weight, sums);
         }
     }
     values

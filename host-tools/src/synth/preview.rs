@@ -9,7 +9,7 @@ use glam::Vec3A;
 use rayon::prelude::*;
 
 /// Part of the picture's light that comes from all around, so that metal has something to reflect.
-const AROUND: f32 = 0.35;
+const AROUND: f32 = 0.4;
 /// Rays along an axis of a pixel.
 const RAYS: usize = 3;
 
@@ -17,7 +17,7 @@ const EXPOSURE: f32 = 1.3;
 
 /// With highlights wide enough that the sky's single directions run into each other.
 fn softened(mut mesh: Mesh) -> Mesh {
-    mesh.vertices.iter_mut().for_each(|v| v.look.widths = v.look.widths.map(|width| width.max(0.3)));
+    mesh.vertices.iter_mut().for_each(|v| v.look.widths = v.look.widths.map(|width| width.max(0.22)));
     mesh
 }
 

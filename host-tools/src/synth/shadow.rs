@@ -3,6 +3,11 @@
 //! Points are projected along the light onto the plane `z = 0`, where the surface stays periodic. A cell
 //! keeps the largest height above its centre; a point is lit where no more than its own plane is there. The
 //! four nearest cells are compared each with the receiver's plane at that cell, and blended.
+//!
+//! Against shadow rays from places that face the light, seen along every view of the 81 (the test
+//! `exactness_of_every_kind`, 1024 cells): the table is on the ray's side of one half for 99.9 % of the places
+//! of checker, rings and hammered, 99.7 % of cloth and knit, and 99.6 % of tissue. Its mean difference from the ray
+//! is 0.001 to 0.006 of the light. The rest lies within a cell of a shadow's edge.
 
 use super::mesh::Mesh;
 use glam::{Vec2, Vec3A, vec2};
