@@ -53,16 +53,16 @@ pub fn rings(random: &mut Random) -> Mesh {
 
 /// Copper beaten with a round hammer: many shallow bowls with soft ridges between.
 pub fn hammered(random: &mut Random) -> Mesh {
-    const SIDE: i32 = 11;
+    const SIDE: i32 = 7;
     let blows: Vec<(Vec2, f32, f32)> = (0..SIDE * SIDE)
         .map(|i| {
             let place = vec2((i % SIDE) as f32, (i / SIDE) as f32) + 0.5 + 0.42 * vec2(signed(random), signed(random));
-            (place / SIDE as f32, 2.6 * (1.0 + 0.3 * signed(random)), 0.0022 * signed(random))
+            (place / SIDE as f32, 1.9 * (1.0 + 0.3 * signed(random)), 0.003 * signed(random))
         })
         .collect();
     let height = |x: f32, y: f32| {
         // A soft minimum over the bowls near by.
-        let sharpness = 1800.0;
+        let sharpness = 1500.0;
         let (column, row) = ((x * SIDE as f32).floor() as i32, (y * SIDE as f32).floor() as i32);
         let mut sum = 0.0;
         for j in row - 2..=row + 2 {
@@ -77,7 +77,7 @@ pub fn hammered(random: &mut Random) -> Mesh {
     };
     let grain = Noise::new(random, 48, 48);
     let mut mesh = Mesh::default();
-    let copper = Look::glossy([0.05, 0.025, 0.015], [0.93, 0.58, 0.42], 0.055);
+    let copper = Look::glossy([0.05, 0.025, 0.015], [0.93, 0.58, 0.42], 0.045);
     mesh.add_height_field(288, height, |x, y| Look { specular: copper.specular * (0.92 + 0.08 * grain.at(x, y)), ..copper });
     mesh
 }

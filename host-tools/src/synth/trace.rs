@@ -68,6 +68,8 @@ impl Tracer {
 
     /// Follows a ray piece by piece until `visit` says that it ends or it leaves the surface's heights.
     fn pieces(&self, mut origin: Vec3A, direction: Vec3A, mut visit: impl FnMut(Ray) -> bool) {
+        // No component may be -0: the tree takes its sign from the comparison with 0 and the sign of its inverse from the bit.
+        let direction = direction + Vec3A::ZERO;
         let level = direction.x.hypot(direction.y);
         let length = if level > 1e-6 { MARGIN / level } else { f32::INFINITY };
         for piece in 0..PIECES {
@@ -138,6 +140,19 @@ mod tests {
             let place = corners[0] * hit.weights[0] + corners[1] * hit.weights[1] + corners[2] * hit.weights[2];
             let along = (place - vec3a(x, y, 0.0)) - view * ((place.z) / view.z);
             assert!((along.x - along.x.round()).abs() < 1e-4 && (along.y - along.y.round()).abs() < 1e-4, "{along}");
+        }
+    }
+    #[test]
+    fn every_view_of_the_grids_sees_every_surface() {
+        for kind in crate::synth::Mesostructure::all() {
+            let tracer = Tracer::new(&kind.mesh(2));
+            for direction in [81, 151].into_iter().flat_map(|count| crate::directions::grid(count).expect("known")) {
+                // Among them the corners of cells, and rays along their edges.
+                for i in 0..64 {
+                    let (x, y) = ((i % 8) as f32 / 8.0, (i / 8) as f32 / 8.0);
+                    assert!(tracer.seen(x, y, 0.01, direction.as_vec3a()).is_some(), "{kind:?}: nothing at {x}, {y} along {direction}");
+                }
+            }
         }
     }
 }

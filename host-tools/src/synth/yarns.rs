@@ -115,7 +115,7 @@ pub fn knit(random: &mut Random) -> Mesh {
     const ROWS: usize = 10;
     let width = 1.0 / WALES as f32;
     let yarn =
-        Yarn { half: [width * 0.135, width * 0.125], plies: 3.0, turns: 21.0, depth: 0.16, colour: [0.16, 0.3, 0.42], steps: [WALES * 52, 16], grain: 80 };
+        Yarn { half: [width * 0.135, width * 0.125], plies: 3.0, turns: 25.0, depth: 0.24, colour: [0.16, 0.3, 0.42], steps: [WALES * 52, 18], grain: 80 };
     let mut mesh = Mesh::default();
     add_ground(&mut mesh, -0.31 * width, 64, Look::glossy([0.05, 0.06, 0.07], [0.0; 3], 0.5));
     for row in 0..ROWS {
