@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`sparsebtf`] | reads the files of SparseBTF 2023 |
 //! | [`model`], [`write`](mod@write), [`triangulate`] | a quantised material in memory, and its bytes |
+//! | [`quantise`] | coefficients become integers |
 //! | [`inspect`], [`picture`], [`demo`] | what `info`, `validate`, `decode` and `demo` show |
 //! | [`kernel`], [`gpu`] | the kernel for other renderers, and run here |
 //! | [`example`], [`extreme`], [`random`] | files that the specification and the tests use |
@@ -22,6 +23,7 @@ pub mod inspect;
 pub mod kernel;
 pub mod model;
 pub mod picture;
+pub mod quantise;
 pub mod random;
 pub mod sparsebtf;
 pub mod triangulate;

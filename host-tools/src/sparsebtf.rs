@@ -6,10 +6,8 @@
 //! whose partners have theirs becomes a mean alone, from the shared mean of all three (their average).
 
 use crate::error::{Result, ToolError};
-use crate::model::{
-    AtomModel, ChannelModel, CoefficientsModel, DictionaryModel, EnsembleModel, FactorModel, MaterialModel, MetadataModel, PairTableModel, RecordModel,
-    TransferModel,
-};
+use crate::model::{AtomModel, ChannelModel, DictionaryModel, EnsembleModel, FactorModel, MaterialModel, MetadataModel, PairTableModel, TransferModel};
+use crate::quantise::{FloatRecord, quantise};
 use crate::triangulate::project;
 use selvedge::pair_table::{BASE_BOUND, MEAN_SHIFT_LIMIT, SCALE_SHIFT_LIMIT};
 use std::collections::BTreeMap;
@@ -420,96 +418,24 @@ fn quantise_channel(authors: &AuthorsChannel, rows: &[usize; 4], value_bits: u32
         dictionaries.push(DictionaryModel { light: light.0, view: view.0, x: x.0, y: y.0 });
         scales.push([x.1, y.1, light.1, view.1]);
     }
-    // Coefficients in units of the channel, positions by the atom's word without shift.
+    // Coefficients in units of the channel.
     let table_gain = (32_768.0f64 / 32_767.0).powi(4);
-    let blocks: Vec<(usize, Vec<(AtomModel, f64)>)> = authors
+    let blocks: Vec<FloatRecord> = authors
         .membership
         .iter()
         .enumerate()
         .map(|(block, k)| {
             let number = number_of[k];
-            let mut list: Vec<(AtomModel, f64)> = (starts[block]..starts[block + 1])
+            let list: Vec<(AtomModel, f64)> = (starts[block]..starts[block + 1])
                 .map(|z| {
                     let [x, y, light, view] = [0, 1, 2, 3].map(|mode| scales[number][mode][&authors.columns[z][mode]]);
                     let atom = AtomModel { x: x.0, y: y.0, light: light.0, view: view.0, ..AtomModel::default() };
                     (atom, authors.values[z] * table_gain * x.1 * y.1 * light.1 * view.1)
                 })
                 .collect();
-            list.sort_by_key(|(atom, _)| atom.word());
             (number, list)
         })
         .collect();
-    let largest_sum = blocks.iter().map(|(_, list)| list.iter().map(|c| c.1.abs()).sum::<f64>()).fold(0.0, f64::max);
-    if largest_sum.is_nan() || largest_sum >= 2000.0 {
-        return Err(ToolError::Usage(format!("coefficients that sum to {largest_sum} are beyond the format")));
-    }
-    // A record's shift of e leaves 2^(e+5) units of the accumulator for one unit of the channel.
-    let mut shift = (5..=26u32).rev().find(|&e| largest_sum * 2f64.powi(e as i32 + 5) < 65_000.0).unwrap_or(5);
-    loop {
-        match quantise_records(&blocks, dictionaries.len(), shift, value_bits) {
-            Some((atoms, records)) => {
-                let coefficients = vec![vec![CoefficientsModel { value_bits, records }]];
-                return Ok(EnsembleModel { dictionaries, atoms, coefficients });
-            }
-            None if shift > 5 => shift -= 1,
-            None => return Err(ToolError::Usage("coefficients sum beyond the format".into())),
-        }
-    }
-}
-
-/// Atoms and records at one shift; `None` if a record's sum is too large.
-fn quantise_records(
-    blocks: &[(usize, Vec<(AtomModel, f64)>)],
-    dictionaries: usize,
-    shift: u32,
-    value_bits: u32,
-) -> Option<(Vec<Vec<AtomModel>>, Vec<RecordModel>)> {
-    let unit = 2f64.powi(shift as i32 + 5);
-    let mut ranges: Vec<BTreeMap<u32, (AtomModel, f64, f64)>> = vec![BTreeMap::new(); dictionaries];
-    for (number, list) in blocks {
-        for (atom, value) in list {
-            let range = ranges[*number].entry(atom.word()).or_insert((*atom, f64::MAX, f64::MIN));
-            *range = (*atom, range.1.min(value * unit), range.2.max(value * unit));
-        }
-    }
-    let levels = (1u32 << value_bits) as f64;
-    let atoms: Vec<Vec<AtomModel>> = ranges
-        .iter()
-        .map(|of_k| {
-            of_k.values()
-                .map(|&(atom, low, high)| {
-                    // The finest shift that leaves room for rounding base and step.
-                    let largest = low.abs().max(high.abs());
-                    let fine = (0..=15u32).rev().find(|&s| largest * 2f64.powi(s as i32) < 32_000.0).unwrap_or(0);
-                    let gain = 2f64.powi(fine as i32);
-                    let base = (low * gain).round();
-                    let step = ((high * gain - base).max(0.0) * levels / (levels - 1.0)).ceil();
-                    AtomModel { shift: fine, base: base as i16, step: step as u16, ..atom }
-                })
-                .collect()
-        })
-        .collect();
-    let places: Vec<BTreeMap<u32, u32>> = ranges.iter().map(|of_k| (0u32..).zip(of_k.keys()).map(|(i, &word)| (word, i)).collect()).collect();
-    let mut records = Vec::with_capacity(blocks.len());
-    for (number, list) in blocks {
-        let mut sum = 0;
-        let coefficients = list
-            .iter()
-            .map(|(atom, value)| {
-                let place = places[*number][&atom.word()];
-                let atom = atoms[*number][place as usize];
-                let target = value * unit * 2f64.powi(atom.shift as i32);
-                let guess = if atom.step == 0 { 0.0 } else { (target - atom.base as f64) * levels / atom.step as f64 };
-                let quantised = guess.round().clamp(0.0, levels - 1.0) as u16;
-                let coefficient = selvedge::ensemble::dequantise(atom.quantiser(), quantised as u32, value_bits);
-                sum += coefficient.unsigned_abs().div_ceil(1 << atom.shift);
-                (place, quantised)
-            })
-            .collect();
-        if sum > selvedge::ensemble_set::SUM_LIMIT {
-            return None;
-        }
-        records.push(RecordModel { dictionary: *number as u32, shift, coefficients });
-    }
-    Some((atoms, records))
+    let (atoms, coefficients) = quantise(&[vec![blocks]], dictionaries.len(), &[vec![value_bits]])?;
+    Ok(EnsembleModel { dictionaries, atoms, coefficients })
 }
