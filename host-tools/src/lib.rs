@@ -5,6 +5,7 @@
 //! | [`sparsebtf`] | reads the files of SparseBTF 2023 |
 //! | [`model`], [`write`](mod@write), [`triangulate`] | a quantised material in memory, and its bytes |
 //! | [`quantise`] | coefficients become integers |
+//! | [`read`], [`trim`](mod@trim), [`sector`] | a file becomes a model again, and a smaller one |
 //! | [`inspect`], [`picture`], [`demo`] | what `info`, `validate`, `decode` and `demo` show |
 //! | [`kernel`], [`gpu`] | the kernel for other renderers, and run here |
 //! | [`example`], [`extreme`], [`random`] | files that the specification and the tests use |
@@ -25,6 +26,9 @@ pub mod model;
 pub mod picture;
 pub mod quantise;
 pub mod random;
+pub mod read;
+pub mod sector;
 pub mod sparsebtf;
 pub mod triangulate;
+pub mod trim;
 pub mod write;
