@@ -6,11 +6,14 @@
 //! | [`model`], [`write`](mod@write), [`triangulate`] | a quantised material in memory, and its bytes |
 //! | [`quantise`] | coefficients become integers |
 //! | [`read`], [`trim`](mod@trim), [`sector`] | a file becomes a model again, and a smaller one |
+//! | [`blend`](mod@blend), [`basis`] | a material between two |
 //! | [`inspect`], [`picture`], [`demo`] | what `info`, `validate`, `decode` and `demo` show |
 //! | [`kernel`], [`gpu`] | the kernel for other renderers, and run here |
 //! | [`example`], [`extreme`], [`random`] | files that the specification and the tests use |
 //! | [`files`], [`error`] | whole writes, exit codes |
 
+pub mod basis;
+pub mod blend;
 pub mod dataset;
 pub mod demo;
 pub mod directions;
