@@ -46,9 +46,9 @@ fn unit(shift: u32) -> f64 {
 ///
 /// # Errors
 /// [`ToolError::Usage`] if `value_bits` has another shape than `records` or a number that is not 1 to 16, if a
-/// record names a dictionary that is not there or an atom twice, if a dictionary
-/// would have more than 65,536 atoms, or if coefficients are too large for the format: 31 for one, or 63
-/// for the sum of a record's magnitudes.
+/// record names a dictionary that is not there or an atom twice, if a dictionary would have more than 65,536
+/// atoms, or if coefficients are too large for the format: 31 for one, or 63 for the sum of a record's
+/// magnitudes.
 pub fn quantise(records: &[Vec<Vec<FloatRecord>>], dictionaries: usize, value_bits: &[Vec<u32>]) -> Result<Quantised> {
     if !records.iter().map(Vec::len).eq(value_bits.iter().map(Vec::len)) {
         return Err(ToolError::Usage("every level and layer has a number of bits of a value".into()));

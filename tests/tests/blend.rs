@@ -7,7 +7,7 @@ use selvedge_tests::setting;
 use selvedge_tools::blend::{Blend, Report, blend};
 use selvedge_tools::extreme::extreme_model;
 use selvedge_tools::model::{AtomModel, DictionaryModel, EnsembleModel, FactorModel, MaterialModel, TransferModel};
-use selvedge_tools::quantise::quantise;
+use selvedge_tools::quantise::{FloatRecord, quantise};
 use selvedge_tools::random::Random;
 use selvedge_tools::read::read_model;
 use selvedge_tools::trim::{Keep, Trim, trim};
@@ -162,7 +162,7 @@ proptest! {
         let r = &mut random;
         let (dictionaries, layers) = (r.range(1, 3) as usize, r.range(1, 4) as usize);
         let loud = 2f64.powi(r.range(-12, 4) as i32);
-        let records: Vec<Vec<Vec<(usize, Vec<(AtomModel, f64)>)>>> = (0..r.range(1, 3))
+        let records: Vec<Vec<Vec<FloatRecord>>> = (0..r.range(1, 3))
             .map(|_| (0..layers).map(|layer| (0..r.range(1, 9)).map(|_| {
                 let mut keys: Vec<u32> = (0..r.range(0, 12)).map(|_| r.range(0, 40) as u32).collect();
                 keys.sort_unstable();
