@@ -5,11 +5,15 @@
 //! | [`sparsebtf`] | reads the files of SparseBTF 2023 |
 //! | [`model`], [`write`](mod@write), [`triangulate`] | a quantised material in memory, and its bytes |
 //! | [`quantise`] | coefficients become integers |
+//! | [`read`], [`trim`](mod@trim), [`sector`] | a file becomes a model again, and a smaller one |
+//! | [`blend`](mod@blend), [`basis`] | a material between two |
 //! | [`inspect`], [`picture`], [`demo`] | what `info`, `validate`, `decode` and `demo` show |
 //! | [`kernel`], [`gpu`] | the kernel for other renderers, and run here |
 //! | [`example`], [`extreme`], [`random`] | files that the specification and the tests use |
 //! | [`files`], [`error`] | whole writes, exit codes |
 
+pub mod basis;
+pub mod blend;
 pub mod blocks;
 pub mod dataset;
 pub mod demo;
@@ -30,8 +34,11 @@ pub mod model;
 pub mod picture;
 pub mod quantise;
 pub mod random;
+pub mod read;
+pub mod sector;
 pub mod sparsebtf;
 pub mod synth;
 pub mod transfer;
 pub mod triangulate;
+pub mod trim;
 pub mod write;

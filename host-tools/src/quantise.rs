@@ -6,9 +6,10 @@
 //! to lose less, since a fine shift for a quiet layer widens the range that a loud one has to share.
 
 use crate::error::{Result, ToolError};
-use crate::model::{AtomModel, CoefficientsModel, RecordModel};
+use crate::model::{AtomModel, CoefficientsModel, PairTableModel, RecordModel};
 use selvedge::ensemble::dequantise;
 use selvedge::ensemble_set::{ATOM_LIMIT, SUM_LIMIT};
+use selvedge::pair_table::{BASE_BOUND, MEAN_SHIFT_LIMIT, SCALE_SHIFT_LIMIT};
 
 /// A record before quantisation: its dictionary, and atoms (columns only) with coefficients.
 ///
@@ -44,10 +45,14 @@ fn unit(shift: u32) -> f64 {
 /// Every atom that a record names is in the table, at the place that 10.5-6 gives it, and no other.
 ///
 /// # Errors
-/// [`ToolError::Usage`] if a record names a dictionary that is not there or an atom twice, if a dictionary
-/// would have more than 65,536 atoms, or if coefficients are too large for the format: 1,000 for one, or
-/// 2,046 for the sum of a record's magnitudes.
+/// [`ToolError::Usage`] if `value_bits` has another shape than `records` or a number that is not 1 to 16, if a
+/// record names a dictionary that is not there or an atom twice, if a dictionary would have more than 65,536
+/// atoms, or if coefficients are too large for the format: 1,000 for one, or 2,046 for the sum of a record's
+/// magnitudes.
 pub fn quantise(records: &[Vec<Vec<FloatRecord>>], dictionaries: usize, value_bits: &[Vec<u32>]) -> Result<Quantised> {
+    if !records.iter().map(Vec::len).eq(value_bits.iter().map(Vec::len)) {
+        return Err(ToolError::Usage("every level and layer has a number of bits of a value".into()));
+    }
     let keys = atom_keys(records, dictionaries)?;
     // Atoms are numbered through all dictionaries; `starts` has the first of each.
     let starts: Vec<usize> = std::iter::once(0)
@@ -97,6 +102,33 @@ pub fn quantise(records: &[Vec<Vec<FloatRecord>>], dictionaries: usize, value_bi
     let atoms = starts.windows(2).map(|of_k| atoms[of_k[0]..of_k[1]].to_vec()).collect();
     let mut filled = records_of.into_iter().zip(&groups).map(|(records, group)| CoefficientsModel { value_bits: group.value_bits, records });
     Ok((atoms, records.iter().map(|level| filled.by_ref().take(level.len()).collect()).collect()))
+}
+
+/// Means in Q20 over the smallest range of 16 bits that holds them (8.1).
+///
+/// # Errors
+/// [`ToolError::Usage`] if they are beyond the format.
+pub fn quantise_means(means_q20: &[f64]) -> Result<PairTableModel> {
+    let (low, high) = means_q20.iter().fold((f64::MAX, f64::MIN), |(low, high), &q| (low.min(q), high.max(q)));
+    let base = ((low + high) / 2.0).round().clamp(-BASE_BOUND as f64, BASE_BOUND as f64);
+    let Some(shift) = (0..=MEAN_SHIFT_LIMIT).find(|&s| (high - base).max(base - low) / 2f64.powi(s as i32) < 32_767.5) else {
+        return Err(ToolError::Usage(format!("means from {:e} to {:e} are beyond the format", low / 1_048_576.0, high / 1_048_576.0)));
+    };
+    let entries = means_q20.iter().map(|q| ((q - base) / 2f64.powi(shift as i32)).round().clamp(-32_767.0, 32_767.0) as i16).collect();
+    Ok(PairTableModel { base_q20: base as i32, shift, entries })
+}
+
+/// Scales, 1 for a texture as it is, in the finest unit that holds them (8.2).
+///
+/// # Errors
+/// [`ToolError::Usage`] if they are beyond the format.
+pub fn quantise_scales(scales: &[f64]) -> Result<PairTableModel> {
+    let largest = scales.iter().fold(0.0f64, |largest, s| largest.max(s.abs()));
+    let Some(shift) = (0..=SCALE_SHIFT_LIMIT).find(|&s| largest / 2f64.powi(s as i32) < 0.999) else {
+        return Err(ToolError::Usage(format!("a scale of {largest:e} is beyond the format")));
+    };
+    let unit = 32_768.0 / 2f64.powi(shift as i32);
+    Ok(PairTableModel { base_q20: 0, shift, entries: scales.iter().map(|s| (s * unit).round().clamp(-32_767.0, 32_767.0) as i16).collect() })
 }
 
 /// The words without shift of all atoms that occur, ascending, for each dictionary.
@@ -223,7 +255,7 @@ fn quantise_group(group: &Group<'_>, atoms: &[AtomModel], starts: &[usize], shif
     let mut records = Vec::with_capacity(group.records.len());
     for (dictionary, list) in group.records {
         if list.is_empty() {
-            records.push(RecordModel::default());
+            records.push(RecordModel { dictionary: 0, shift: *SHIFTS.start(), coefficients: Vec::new() });
             continue;
         }
         let mut sum = 0;

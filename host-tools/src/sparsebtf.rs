@@ -7,9 +7,8 @@
 
 use crate::error::{Result, ToolError};
 use crate::model::{AtomModel, ChannelModel, DictionaryModel, EnsembleModel, FactorModel, MaterialModel, MetadataModel, PairTableModel, TransferModel};
-use crate::quantise::{FloatRecord, quantise};
+use crate::quantise::{FloatRecord, quantise, quantise_means, quantise_scales};
 use crate::triangulate::project;
-use selvedge::pair_table::{BASE_BOUND, MEAN_SHIFT_LIMIT, SCALE_SHIFT_LIMIT};
 use std::collections::BTreeMap;
 use std::f64::consts::LN_2;
 use std::path::{Path, PathBuf};
@@ -350,27 +349,14 @@ impl AuthorsMaterial {
     }
 }
 
-/// Means, natural logarithm to base two, over the smallest range of 16 bits that holds them.
+/// Means, natural logarithm to base two.
 fn mean_table(means: &[f64]) -> Result<PairTableModel> {
-    let q20: Vec<f64> = means.iter().map(|m| m / LN_2 * 1_048_576.0).collect();
-    let (low, high) = q20.iter().fold((f64::MAX, f64::MIN), |(low, high), &q| (low.min(q), high.max(q)));
-    let base = ((low + high) / 2.0).round();
-    let shift = (0..=MEAN_SHIFT_LIMIT).find(|&s| (high - base) / 2f64.powi(s as i32) < 32_767.0);
-    let Some(shift) = shift.filter(|_| base.abs() <= BASE_BOUND as f64) else {
-        return Err(ToolError::Usage(format!("means from {low:e} to {high:e} are beyond the format")));
-    };
-    let entries = q20.iter().map(|q| ((q - base) / 2f64.powi(shift as i32)).round().clamp(-32_767.0, 32_767.0) as i16).collect();
-    Ok(PairTableModel { base_q20: base as i32, shift, entries })
+    quantise_means(&means.iter().map(|m| m / LN_2 * 1_048_576.0).collect::<Vec<_>>())
 }
 
 /// Scales, natural logarithm to base two.
 fn scale_table(scales: &[f64]) -> Result<PairTableModel> {
-    let largest = scales.iter().fold(0.0f64, |largest, s| largest.max(s.abs())) / LN_2;
-    let Some(shift) = (0..=SCALE_SHIFT_LIMIT).find(|&s| largest / 2f64.powi(s as i32) < 0.999) else {
-        return Err(ToolError::Usage(format!("a scale of {largest:e} is beyond the format")));
-    };
-    let unit = 32_768.0 / 2f64.powi(shift as i32) / LN_2;
-    Ok(PairTableModel { base_q20: 0, shift, entries: scales.iter().map(|s| (s * unit).round().clamp(-32_767.0, 32_767.0) as i16).collect() })
+    quantise_scales(&scales.iter().map(|s| s / LN_2).collect::<Vec<_>>())
 }
 
 /// A column scaled to its largest entry, and that entry.

@@ -4,14 +4,13 @@ use super::candidates::Candidates;
 use super::select::Selection;
 use super::{COEFFICIENT_BITS, Options, Prepared};
 use crate::dictionary::Ensemble;
-use crate::error::{Result, ToolError};
+use crate::error::Result;
 use crate::linear::Basis;
 use crate::model::{AtomModel, ChannelModel, CoefficientsModel, DictionaryModel, EnsembleModel, FactorModel, MaterialModel, MetadataModel, PairTableModel};
-use crate::quantise::{FloatRecord, quantise};
+use crate::quantise::{FloatRecord, quantise, quantise_means};
 use crate::transfer::matrix_q13;
 use crate::triangulate::project;
 use selvedge::ensemble::dequantise;
-use selvedge::pair_table::{BASE_BOUND, MEAN_SHIFT_LIMIT};
 
 /// Means of a channel as a file holds them.
 pub type MeanTable = PairTableModel;
@@ -31,24 +30,11 @@ pub fn mean_tables(means: &[Vec<f64>; 3]) -> Result<([MeanTable; 3], [Vec<f32>; 
     let mut tables: [MeanTable; 3] = Default::default();
     let mut decoded: [Vec<f32>; 3] = Default::default();
     for c in 0..3 {
-        tables[c] = mean_table(means[c].iter().map(|m| m * 1_048_576.0))?;
+        tables[c] = quantise_means(&means[c].iter().map(|m| m * 1_048_576.0).collect::<Vec<_>>())?;
         let (base, gain) = (tables[c].base_q20 as f64, 2f64.powi(tables[c].shift as i32));
         decoded[c] = tables[c].entries.iter().map(|&e| ((base + e as f64 * gain) / 1_048_576.0) as f32).collect();
     }
     Ok((tables, decoded))
-}
-
-/// A table of means in Q20.
-pub fn mean_table(q20: impl Iterator<Item = f64>) -> Result<MeanTable> {
-    let q20: Vec<f64> = q20.collect();
-    let (low, high) = q20.iter().fold((f64::MAX, f64::MIN), |(low, high), &q| (low.min(q), high.max(q)));
-    let base = ((low + high) / 2.0).round();
-    let shift = (0..=MEAN_SHIFT_LIMIT).find(|&s| (high - base) / 2f64.powi(s as i32) < 32_767.0);
-    let Some(shift) = shift.filter(|_| base.abs() <= BASE_BOUND as f64) else {
-        return Err(ToolError::Usage(format!("means from {:e} to {:e} are beyond the format", low / 1_048_576.0, high / 1_048_576.0)));
-    };
-    let entries = q20.iter().map(|q| ((q - base) / 2f64.powi(shift as i32)).round().clamp(-32_767.0, 32_767.0) as i16).collect();
-    Ok(PairTableModel { base_q20: base as i32, shift, entries })
 }
 
 /// Columns of a basis that are used, each scaled to its largest entry.

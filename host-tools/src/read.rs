@@ -1,0 +1,181 @@
+//! The reader: a file becomes a model, the way back from [`crate::write`].
+//!
+//! The core opens the file first, so that nothing illegal gets this far. A file that this writer made is
+//! written again with the same bytes. A file of another encoder may have other triangles or another grid
+//! than the written rule (5.8) gives, or wider fields; a model has none of these, so the writer makes them
+//! anew. Fields and the grid change no result. Triangles do: [`same_triangles`] tells.
+
+use crate::model::{
+    AtomModel, ChannelModel, CoefficientsModel, DictionaryModel, EnsembleModel, FactorModel, MaterialModel, MetadataModel, PairTableModel, RecordModel,
+    TransferModel,
+};
+use crate::triangulate::triangulate;
+use selvedge::direction::{hull_start, point, triangles_start};
+use selvedge::directory::OPTIONAL;
+use selvedge::ensemble::{Record, coefficients_start, low_part, read_record};
+use selvedge::material::{CHANNEL_FULL, CHANNEL_MISSING, Channel, TRANSFER_LINEAR, level_size};
+use selvedge::words::{Words, bit_window, high_i16, low_i16, packed_i16, word};
+use selvedge::{Finding, Limits, Selvedge};
+
+/// Opens a material and takes it apart; factors of an external dictionary become the model's own.
+///
+/// # Errors
+/// The first broken rule, as [`selvedge::open_with`].
+pub fn read_model(file: &[u8], dictionary: Option<&[u8]>, limits: &Limits) -> Result<MaterialModel, Finding> {
+    Ok(model_of(&selvedge::open_with(file, dictionary, limits)?))
+}
+
+/// The model of an open material.
+pub fn model_of(opened: &Selvedge<'_>) -> MaterialModel {
+    let (header, material, words) = (opened.header(), opened.material(), opened.words());
+    let metadata = opened.metadata();
+    let transfer = if header.transfer == TRANSFER_LINEAR {
+        TransferModel::Linear { exponent: header.transfer_parameter as i32 }
+    } else {
+        TransferModel::Log2 { offset: f32::from_bits(header.transfer_parameter) }
+    };
+    let bytes_of = |section: &selvedge::Section| words.file[section.offset as usize..][..section.length as usize].to_vec();
+    MaterialModel {
+        size: [header.width, header.height],
+        level_count: header.level_count,
+        edge: header.edge,
+        layer_count: header.layer_count,
+        transfer,
+        cosine_included: header.cosine_included != 0,
+        matrix_q13: header.matrix_q13.map(|entry| entry as i16),
+        metadata: MetadataModel {
+            texel_nm: [metadata.texel_width_nm, metadata.texel_height_nm],
+            frame: metadata.frame,
+            image_origin: metadata.image_origin,
+            primaries: metadata.primaries,
+            texts: [metadata.name, metadata.origin, metadata.licence].map(str::to_owned),
+        },
+        lights: points(words, material.light_start),
+        views: (material.view_start != material.light_start).then(|| points(words, material.view_start)),
+        channels: material.channels.map(|channel| ChannelModel {
+            mean: (channel.state != CHANNEL_MISSING).then(|| pair_table(opened, channel.mean_start)),
+            scale: (channel.scale_start != 0).then(|| pair_table(opened, channel.scale_start)),
+            ensemble: (channel.state == CHANNEL_FULL).then(|| ensemble(opened, channel)),
+        }),
+        extras: opened
+            .sections()
+            .filter(|section| section.kind >= OPTIONAL)
+            .map(|section| (section.kind as u16, section.instance as u16, bytes_of(&section)))
+            .collect(),
+    }
+}
+
+/// Whether the sets of directions of a file are triangulated as the writer would do it.
+///
+/// If not, a model read from it and written again has other results between sample directions.
+pub fn same_triangles(opened: &Selvedge<'_>) -> bool {
+    let words = opened.words();
+    [opened.material().light_start, opened.material().view_start].iter().all(|&start| {
+        let (triangles, hull) = (triangles_start(words, start), hull_start(words, start));
+        let corners = |i: u32| {
+            let (first, second) = (word(words, triangles + i * 3), word(words, triangles + i * 3 + 1));
+            [first & 0xffff, first >> 16, second & 0xffff]
+        };
+        let written = triangulate(&points(words, start), Some(1));
+        (0..word(words, start + 1)).map(corners).eq(written.triangles)
+            && (0..word(words, start + 2)).map(|i| word(words, hull + i * 2) & 0xffff).eq(written.hull)
+    })
+}
+
+fn points(words: Words<'_>, start: u32) -> Vec<[i32; 2]> {
+    let at = |index: u32| {
+        let pair = point(words, start, index);
+        [low_i16(pair), high_i16(pair)]
+    };
+    (0..word(words, start)).map(at).collect()
+}
+
+/// Rows of packed numbers, each padded to a word.
+fn packed_rows(words: Words<'_>, table: u32, rows: u32, columns: u32) -> Vec<i16> {
+    let row_words = columns.div_ceil(2);
+    (0..rows).flat_map(|row| (0..columns).map(move |column| packed_i16(words, table + row * row_words, column) as i16)).collect()
+}
+
+fn pair_table(opened: &Selvedge<'_>, start: u32) -> PairTableModel {
+    let (words, header) = (opened.words(), opened.header());
+    PairTableModel {
+        base_q20: word(words, start) as i32,
+        shift: word(words, start + 1),
+        entries: packed_rows(words, start + 4, header.view_count, header.light_count),
+    }
+}
+
+fn ensemble(opened: &Selvedge<'_>, channel: Channel) -> EnsembleModel {
+    let (header, material, words) = (opened.header(), opened.material(), opened.words());
+    let factor = |section: u32, k: u32, second: u32, rows: u32| {
+        let entry = section + 2 + k * 4 + second;
+        let columns = word(words, entry);
+        FactorModel { columns, entries: packed_rows(words, section + word(words, entry + 2), rows, columns) }
+    };
+    let count = word(words, channel.angular_start);
+    let dictionaries = (0..count)
+        .map(|k| DictionaryModel {
+            light: factor(channel.angular_start, k, 0, header.light_count),
+            view: factor(channel.angular_start, k, 1, header.view_count),
+            x: factor(channel.spatial_start, k, 0, header.edge),
+            y: factor(channel.spatial_start, k, 1, header.edge),
+        })
+        .collect();
+    let atoms = (0..count)
+        .map(|k| {
+            let entry = channel.atoms_start + 2 + k * 2;
+            let list = channel.atoms_start + word(words, entry + 1);
+            (0..word(words, entry)).map(|i| atom(word(words, list + i * 2), word(words, list + i * 2 + 1))).collect()
+        })
+        .collect();
+    let coefficients = (0..header.level_count)
+        .map(|level| {
+            let blocks: u32 = [header.width, header.height].iter().map(|&size| level_size(size, level).div_ceil(header.edge)).product();
+            let of_layer = |layer: u32| {
+                let start = coefficients_start(words, material, channel, level, layer);
+                let records = (0..blocks).map(|block| record(words, read_record(words, start, block))).collect();
+                CoefficientsModel { value_bits: word(words, start) & 0xff, records }
+            };
+            (0..header.layer_count).map(of_layer).collect()
+        })
+        .collect();
+    EnsembleModel { dictionaries, atoms, coefficients }
+}
+
+fn atom(word: u32, quantiser: u32) -> AtomModel {
+    AtomModel {
+        light: word >> 14 & 0x3ff,
+        view: word >> 4 & 0x3ff,
+        x: word >> 24 & 0xf,
+        y: word >> 28,
+        shift: word & 0xf,
+        base: quantiser as u16 as i16,
+        step: (quantiser >> 16) as u16,
+    }
+}
+
+/// The positions and values of a record (10.4), walked as the decoder does.
+fn record(words: Words<'_>, record: Record) -> RecordModel {
+    if record.count == 0 {
+        return RecordModel::default();
+    }
+    let field_bits = record.low_bits + record.value_bits;
+    let (mut bit, mut high) = (record.highs_bit, 0);
+    let coefficients = (0..record.count)
+        .map(|index| {
+            let mut window = bit_window(words, record.stream, bit);
+            while window == 0 && high < 65_536 {
+                high += 32;
+                bit += 32;
+                window = bit_window(words, record.stream, bit);
+            }
+            let zeros = window.trailing_zeros() & 31;
+            high += zeros;
+            bit += zeros + 1;
+            let field = bit_window(words, record.stream, record.fields_bit + index * field_bits);
+            let position = high << record.low_bits | low_part(field, record.low_bits);
+            (position, low_part(field >> record.low_bits, record.value_bits) as u16)
+        })
+        .collect();
+    RecordModel { dictionary: record.dictionary, shift: record.shift, coefficients }
+}

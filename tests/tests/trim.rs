@@ -1,0 +1,213 @@
+//! Reading a file back gives its bytes, and what is trimmed decodes to the bits of the whole.
+
+use proptest::prelude::*;
+use selvedge::interpolation::{filtered_values, trilinear_values};
+use selvedge::{Direction, Limits, Rule, Selvedge, Values};
+use selvedge_tests::setting;
+use selvedge_tools::example::example_model;
+use selvedge_tools::extreme::extreme_model;
+use selvedge_tools::model::MaterialModel;
+use selvedge_tools::random::Random;
+use selvedge_tools::read::{model_of, read_model, same_triangles};
+use selvedge_tools::sector::{Sector, kept_directions};
+use selvedge_tools::trim::{Keep, Trim, trim};
+use selvedge_tools::write::{write_material, write_split};
+use std::path::Path;
+
+fn excerpt() -> Vec<u8> {
+    std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("data/carpet07-excerpt.selv")).expect("excerpt")
+}
+
+fn open(file: &[u8]) -> Selvedge<'_> {
+    selvedge::open(file, &Limits::NONE).unwrap_or_else(|finding| panic!("{finding}"))
+}
+
+fn cases(count: u32) -> ProptestConfig {
+    ProptestConfig { cases: setting("SELVEDGE_CASES", count as usize) as u32, failure_persistence: None, ..ProptestConfig::default() }
+}
+
+/// A direction anywhere, or at and near a sample direction, a middle of two, or the prolongation of two.
+fn direction(random: &mut Random, points: &[[i32; 2]]) -> Direction {
+    let any = [random.range(-263_000, 263_000) as i32, random.range(-263_000, 263_000) as i32];
+    let mut point = || random.pick(points).map(|c| c << 4);
+    let (a, b) = (point(), point());
+    let [x, y] = match random.range(0, 5) {
+        0 => any,
+        1 => a,
+        2 => a.map(|c| c + random.range(-20, 20) as i32),
+        3 => [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2],
+        4 => [2 * b[0] - a[0], 2 * b[1] - a[1]],
+        // Square to the line of two: where edges of the hull in one line meet.
+        _ => [a[0] + b[1] - a[1], a[1] - b[0] + a[0]],
+    };
+    Direction { x_q18: x.clamp(-262_144, 262_144), y_q18: y.clamp(-262_144, 262_144), z_q15: random.range(0, 32_768) as i32 }
+}
+
+fn sector(random: &mut Random) -> Sector {
+    let polar_max = random.pick(&[0.0, 1.0, 20.0, 45.0, 75.0, 90.0]);
+    let width = random.pick(&[0.0, 3.0, 40.0, 90.0, 200.0, 359.0]);
+    let from = random.range(-400, 400) as f64;
+    Sector::new(polar_max, random.once_in(4).then_some([from, from + width]).or_else(|| random.once_in(2).then_some([0.0, 90.0]))).expect("angles")
+}
+
+/// A direction in the sector, after a few tries.
+fn inside(random: &mut Random, points: &[[i32; 2]], sector: &Option<Sector>) -> Direction {
+    let is_inside = |direction: &Direction| sector.is_none_or(|sector| sector.contains(*direction));
+    (0..60).map(|_| direction(random, points)).find(is_inside).unwrap_or(Direction { z_q15: 30_000, ..Direction::default() })
+}
+
+fn as_array(values: Values) -> [i32; 3] {
+    [values.c0, values.c1, values.c2]
+}
+
+/// Holds samples of every kind of a trimmed file against those of the whole.
+fn hold_trim(model: &MaterialModel, options: &Trim, random: &mut Random, count: usize) {
+    let left = trim(model, options).expect("options that fit");
+    let (whole_file, left_file) = (write_material(model), write_material(&left));
+    let (whole, trimmed) = (open(&whole_file).with_layers(left.layer_count), open(&left_file));
+    let all = |points: &[[i32; 2]]| (0..points.len() as u32).collect::<Vec<_>>();
+    let lights = options.lights.map_or(all(&model.lights), |sector| kept_directions(&model.lights, &sector));
+    let views = options.views.map_or(all(model.views()), |sector| kept_directions(model.views(), &sector));
+    assert_eq!((lights.len(), views.len()), (left.lights.len(), left.views().len()));
+    assert_eq!(left.views.is_none(), model.views.is_none() && lights == views);
+    let keeps_all = options.channels == [Keep::Texture; 3];
+    let same = |found: Values, wanted: Values, what: &str| {
+        for (c, (found, wanted)) in as_array(found).into_iter().zip(as_array(wanted)).enumerate() {
+            let state = left.channels[c].state();
+            match options.channels[c] {
+                Keep::Texture => assert_eq!(found, wanted, "{what}, channel {c}"),
+                Keep::Mean if state == model.channels[c].state() => assert_eq!(found, wanted, "{what}, channel {c}"),
+                Keep::Mean => assert_eq!(state, 1),
+                Keep::Nothing => assert_eq!((state, found), (0, 0)),
+            }
+        }
+    };
+    for _ in 0..count {
+        let (x, y) = (random.range(0, 40) as u32, random.range(0, 40) as u32);
+        let (l, v) = (random.range(0, lights.len() as i64 - 1) as usize, random.range(0, views.len() as i64 - 1) as usize);
+        let point = trimmed.point_values(x, y, l as u32, v as u32);
+        same(point, whole.point_values(x, y, lights[l], views[v]), "point");
+
+        let (u_q32, v_q32) = (random.word(), random.word());
+        let (light, view) = (inside(random, &model.lights, &options.lights), inside(random, model.views(), &options.views));
+        let located = |material: &Selvedge<'_>| (material.locate_light(light), material.locate_view(view));
+        let ((l, v), (whole_l, whole_v)) = (located(&trimmed), located(&whole));
+        let renumbered = [lights[l.a as usize], lights[l.b as usize], lights[l.c as usize], l.weight_a_q15 as u32, l.weight_b_q15 as u32, l.cosine_q15 as u32];
+        let wanted = [whole_l.a, whole_l.b, whole_l.c, whole_l.weight_a_q15 as u32, whole_l.weight_b_q15 as u32, whole_l.cosine_q15 as u32];
+        assert_eq!(renumbered, wanted, "{light:?}");
+        let level = random.range(0, left.level_count as i64 - 1) as u32;
+        let at = |m: &Selvedge<'_>, l, v| filtered_values(m.words(), m.material(), level, u_q32, v_q32, l, v);
+        same(at(&trimmed, l, v), at(&whole, whole_l, whole_v), "filtered");
+        let level_q16 = random.range(0, ((left.level_count as i64 - 1) << 16).max(0)) as u32;
+        let between = |m: &Selvedge<'_>, l, v| trilinear_values(m.words(), m.material(), level_q16, u_q32, v_q32, l, v);
+        same(between(&trimmed, l, v), between(&whole, whole_l, whole_v), "between levels");
+        if keeps_all {
+            assert_eq!(trimmed.filtered(u_q32, v_q32, light, view), whole.filtered(u_q32, v_q32, light, view));
+            assert_eq!(trimmed.trilinear(level_q16, u_q32, v_q32, light, view), whole.trilinear(level_q16, u_q32, v_q32, light, view));
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(cases(300))]
+
+    #[test]
+    fn files_are_read_back(seed in 0u64..1_000_000) {
+        let model = extreme_model(seed);
+        let file = write_material(&model);
+        let read = read_model(&file, None, &Limits::NONE).expect("legal");
+        prop_assert!(write_material(&read) == file);
+        prop_assert!(same_triangles(&open(&file)));
+        prop_assert_eq!(read, model);
+    }
+
+    #[test]
+    fn split_files_are_read_back(seed in 0u64..1_000_000) {
+        let model = extreme_model(seed);
+        prop_assume!(model.channels.iter().any(|channel| channel.ensemble.is_some()));
+        let (file, dictionary) = write_split(&model);
+        let read = read_model(&file, Some(&dictionary), &Limits::NONE).expect("legal");
+        prop_assert!(write_split(&read) == (file, dictionary));
+        prop_assert_eq!(read, model);
+    }
+
+    #[test]
+    fn layers_levels_channels_and_unused_parts_go(seed in 0u64..1_000_000) {
+        let model = extreme_model(seed);
+        let mut random = Random::new(seed);
+        let r = &mut random;
+        let options = Trim {
+            layers: r.once_in(2).then(|| r.range(1, model.layer_count as i64) as u32),
+            levels: r.once_in(2).then(|| r.range(1, model.level_count as i64) as u32),
+            channels: std::array::from_fn(|_| r.pick(&[Keep::Texture, Keep::Texture, Keep::Mean, Keep::Nothing])),
+            unused: r.once_in(2),
+            ..Trim::default()
+        };
+        hold_trim(&model, &options, r, 20);
+    }
+
+    #[test]
+    fn sectors_keep_their_bits(seed in 0u64..1_000_000) {
+        let model = extreme_model(seed);
+        let mut random = Random::new(seed);
+        let r = &mut random;
+        let lights = (!r.once_in(5)).then(|| sector(r));
+        let views = if r.once_in(4) { lights } else { (!r.once_in(5)).then(|| sector(r)) };
+        let options = Trim { lights, views, unused: r.once_in(3), ..Trim::default() };
+        hold_trim(&model, &options, r, 60);
+    }
+}
+
+#[test]
+fn the_excerpt_and_the_example_are_read_back() {
+    let file = excerpt();
+    assert!(write_material(&read_model(&file, None, &Limits::NONE).expect("legal")) == file);
+    let model = example_model();
+    assert_eq!(model_of(&open(&write_material(&model))), model);
+}
+
+#[test]
+fn illegal_files_are_refused() {
+    let mut file = excerpt();
+    file[0x8000] ^= 1;
+    assert_eq!(read_model(&file, None, &Limits::NONE).expect_err("a checksum").rule, Rule::SectionChecksum);
+    let few = Limits { operations: 100, ..Limits::NONE };
+    assert_eq!(read_model(&excerpt(), None, &few).expect_err("a limit").rule, Rule::LimitOperations);
+}
+
+#[test]
+fn the_excerpt_is_trimmed() {
+    let model = model_of(&open(&excerpt()));
+    let mut random = Random::new(11);
+    let whole = write_material(&model).len();
+    for (polar_max, azimuth) in [(0.0, None), (30.0, None), (60.0, Some([0.0, 90.0])), (90.0, Some([300.0, 20.0])), (90.0, None)] {
+        let sector = Sector::new(polar_max, azimuth).expect("angles");
+        for (lights, views) in [(Some(sector), None), (None, Some(sector)), (Some(sector), Some(sector))] {
+            let options = Trim { lights, views, unused: true, ..Trim::default() };
+            hold_trim(&model, &options, &mut random, 60);
+            let left = trim(&model, &options).expect("options that fit");
+            let length = write_material(&left).len();
+            println!("{polar_max} {azimuth:?}: {} lights, {} views, {length} of {whole} bytes", left.lights.len(), left.views().len());
+        }
+    }
+    let few = kept_directions(&model.lights, &Sector::new(30.0, None).expect("angles"));
+    assert!(few.len() < model.lights.len() / 2, "{} directions are kept", few.len());
+    let plain = Trim { channels: [Keep::Texture, Keep::Mean, Keep::Nothing], ..Trim::default() };
+    hold_trim(&model, &plain, &mut random, 60);
+}
+
+#[test]
+fn options_that_do_not_fit_are_refused() {
+    let model = example_model();
+    for options in [
+        Trim { layers: Some(2), ..Trim::default() },
+        Trim { layers: Some(0), ..Trim::default() },
+        Trim { levels: Some(3), ..Trim::default() },
+        Trim { lights: Some(Sector { polar_max: 91.0, azimuth: None }), ..Trim::default() },
+        Trim { views: Some(Sector { polar_max: f64::NAN, azimuth: None }), ..Trim::default() },
+        Trim { views: Some(Sector { polar_max: 9.0, azimuth: Some([0.0, f64::INFINITY]) }), ..Trim::default() },
+    ] {
+        assert_eq!(trim(&model, &options).expect_err("refused").exit_code(), 1, "{options:?}");
+    }
+    assert_eq!(trim(&model, &Trim::default()).expect("nothing goes"), model);
+}
