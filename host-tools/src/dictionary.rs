@@ -5,6 +5,7 @@
 //! in its own way and keeps the others. So the costly product with all directions is made once a block
 //! (equation 3 in a subspace), and a dictionary adds small products only.
 
+use crate::model::DictionaryModel;
 use crate::linear::{Basis, product, product_at};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
@@ -31,6 +32,8 @@ pub struct Ensemble {
     pub view: Basis,
     /// The dictionaries.
     pub turns: Vec<Turn>,
+    /// The integer columns of a dictionary file that the ensemble was read from.
+    pub tables: Option<Vec<DictionaryModel>>,
 }
 
 /// Scratch of projections.
@@ -129,7 +132,7 @@ mod tests {
         let mut basis = |n: usize| nearest_orthogonal(&any(n * n), n).expect("finite");
         let turn = Turn { light: Some(basis(r)), view: Some(basis(r)), x: basis(edge), y: basis(edge) };
         let plain = Turn { light: None, view: None, x: basis(edge), y: basis(edge) };
-        let ensemble = Ensemble { light: basis(lights).first(6), view: basis(views), turns: vec![turn, plain] };
+        let ensemble = Ensemble { light: basis(lights).first(6), view: basis(views), turns: vec![turn, plain], tables: None };
         let block: Vec<f32> = any(edge * edge * lights * views).iter().map(|&v| v as f32).collect();
         let (mut scratch, mut core, mut out) = (Scratch::default(), Vec::new(), Vec::new());
         ensemble.to_core(&block, &mut scratch, &mut core);

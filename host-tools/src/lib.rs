@@ -38,6 +38,7 @@ pub mod read;
 pub mod sector;
 pub mod sparsebtf;
 pub mod synth;
+pub mod train;
 pub mod transfer;
 pub mod triangulate;
 pub mod trim;

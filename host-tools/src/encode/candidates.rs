@@ -44,7 +44,7 @@ const BUCKETS: usize = 1 << 15;
 
 /// A magnitude that at least `count` of the numbers reach, less than 1 % below the largest such, and the energy of those
 /// above it.
-fn magnitude_of_rank(numbers: &[f32], count: usize, buckets: &mut Vec<u32>) -> (f32, f64) {
+pub fn magnitude_of_rank(numbers: &[f32], count: usize, buckets: &mut Vec<u32>) -> (f32, f64) {
     buckets.clear();
     buckets.resize(BUCKETS, 0);
     for number in numbers {

@@ -101,7 +101,7 @@ impl Prepared<'_> {
             let description = self.levels[0].description();
             let (light, _) = eigenbasis(&self.moments.lights[c], description.lights.len());
             let (view, _) = eigenbasis(&self.moments.views[c], description.views.len());
-            Ensemble { light, view, turns: vec![Turn { light: None, view: None, x: Basis::cosine(edge), y: Basis::cosine(edge) }] }
+            Ensemble { light, view, turns: vec![Turn { light: None, view: None, x: Basis::cosine(edge), y: Basis::cosine(edge) }], tables: None }
         })
     }
 
@@ -112,7 +112,8 @@ impl Prepared<'_> {
         (texels * description.pairs() * 3) as f64
     }
 
-    fn blocks(&self, level: usize, edge: usize) -> Blocks<'_> {
+    /// Blocks of a level.
+    pub fn blocks(&self, level: usize, edge: usize) -> Blocks<'_> {
         Blocks { dataset: self.levels[level], forward: self.forward, edge, means: &self.decoded_means }
     }
 
