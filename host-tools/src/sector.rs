@@ -3,13 +3,16 @@
 //! A query in the sector must have the taps that it had in the whole set. So all corners of every triangle
 //! that the sector touches are kept, and both ends of every hull edge, and every hull corner, whose queries
 //! beyond the hull are in the sector. That the kept ones are triangulated alike follows from the written
-//! rule (5.8): an empty circle stays empty where directions leave, and a face of more than three corners
-//! is split alike if all corners on its circle stay, since numbers keep their order. Kept directions on one
-//! edge of the hull stay neighbours. All this is checked again on the result; should it not hold, the
-//! whole set is kept.
+//! rule (5.8): an empty circle stays empty where directions leave; a face of more than three corners is a
+//! fan from its lowest number, which every triangle of it has, so that the triangles that stay are still
+//! of the fan, numbers keeping their order. Kept directions on one edge of the hull stay neighbours.
+//!
+//! One thing can change: the hull begins at its lowest number, and where two of its edges lie in one line
+//! the first answers for queries above the point between them. So all is checked on the result; where it
+//! does not hold the whole set is kept (three of forty thousand random sets).
 
 use crate::error::{Result, ToolError};
-use crate::triangulate::{Triangulation, in_circle, triangulate};
+use crate::triangulate::{Triangulation, triangulate};
 use selvedge::Direction;
 use selvedge::direction::{cross, dot_product};
 
@@ -188,10 +191,6 @@ pub fn kept_directions(points: &[[i32; 2]], sector: &Sector) -> Vec<u32> {
     let mut is_kept = vec![false; points.len()];
     for &corners in &needed.triangles {
         corners.iter().for_each(|&corner| is_kept[corner as usize] = true);
-        let [a, b, c] = corners.map(|corner| points[corner as usize]);
-        for (kept, &point) in is_kept.iter_mut().zip(points) {
-            *kept |= in_circle(a, b, c, point) == 0;
-        }
     }
     for &edge in &needed.edges {
         is_kept[whole.hull[edge] as usize] = true;

@@ -30,7 +30,7 @@ impl Triangulation {
 }
 
 /// Exact in-circle determinant: zero if `d` is on the circle of the counter-clockwise `a`, `b`, `c`.
-pub fn in_circle(a: [i32; 2], b: [i32; 2], c: [i32; 2], d: [i32; 2]) -> i128 {
+fn in_circle(a: [i32; 2], b: [i32; 2], c: [i32; 2], d: [i32; 2]) -> i128 {
     let row = |p: [i32; 2]| {
         let (x, y) = ((p[0] - d[0]) as i128, (p[1] - d[1]) as i128);
         (x, y, x * x + y * y)

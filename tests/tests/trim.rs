@@ -166,6 +166,22 @@ fn the_excerpt_and_the_example_are_read_back() {
     assert_eq!(model_of(&open(&write_material(&model))), model);
 }
 
+/// Hulls that would begin elsewhere if directions left, with queries above a point between two edges in one line.
+#[test]
+fn the_hull_begins_where_it_did() {
+    for (seed, polar_max, [x_q18, y_q18]) in [(501_238, 75.0, [170_252, 76_001]), (505_026, 1.0, [816, 32]), (506_440, 90.0, [240, 992])] {
+        let model = extreme_model(seed);
+        let sector = Sector::new(polar_max, Some([0.0, 90.0])).expect("angles");
+        let kept = kept_directions(&model.lights, &sector);
+        let left = trim(&model, &Trim { lights: Some(sector), ..Trim::default() }).expect("options that fit");
+        let asked = Direction { x_q18, y_q18, z_q15: 20_000 };
+        let files = [&model, &left].map(write_material);
+        let [whole, trimmed] = files.each_ref().map(|file| open(file).locate_light(asked));
+        assert_eq!([trimmed.a, trimmed.b].map(|i| kept[i as usize]), [whole.a, whole.b], "seed {seed}");
+        assert_eq!((trimmed.weight_b_q15, trimmed.cosine_q15), (whole.weight_b_q15, whole.cosine_q15));
+    }
+}
+
 #[test]
 fn illegal_files_are_refused() {
     let mut file = excerpt();
