@@ -40,7 +40,7 @@ fn main() {
                         }
                     };
                     let took = t.elapsed();
-                    let file = selvedge::open(&encoded.bytes, &Default::default()).unwrap();
+                    let file = selvedge::open(&encoded.bytes, &selvedge::Limits::NONE).unwrap();
                     let m = if args.len() > 5 {
                         measure::compare(measure::Source::Data(&data), measure::Source::File(&file, 0), data.description(), e, None, &|_, _| ()).unwrap()
                     } else {

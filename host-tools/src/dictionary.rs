@@ -5,8 +5,8 @@
 //! in its own way and keeps the others. So the costly product with all directions is made once a block
 //! (equation 3 in a subspace), and a dictionary adds small products only.
 
-use crate::model::DictionaryModel;
 use crate::linear::{Basis, product, product_at};
+use crate::model::DictionaryModel;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
 

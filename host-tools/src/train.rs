@@ -145,8 +145,11 @@ pub fn train(datasets: &[&Dataset], options: &Options, state: Option<&Path>, tel
     let identity = identity(datasets, options);
     let mut now = match state.filter(|path| path.exists()) {
         Some(path) => {
-            let found: State = serde_json::from_slice(&crate::files::read(path)?)
-                .map_err(|error| ToolError::Foreign { path: path.to_owned(), offset: 0, what: error.to_string() })?;
+            let found: State = serde_json::from_slice(&crate::files::read(path)?).map_err(|error| ToolError::Foreign {
+                path: path.to_owned(),
+                offset: 0,
+                what: error.to_string(),
+            })?;
             if found.identity != identity {
                 return Err(ToolError::Usage(format!("{}: is of another training; remove it to begin anew", path.display())));
             }

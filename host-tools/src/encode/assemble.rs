@@ -3,14 +3,21 @@
 use super::candidates::Candidates;
 use super::select::Selection;
 use super::{COEFFICIENT_BITS, Options, Prepared};
+use crate::dataset::Description;
 use crate::dictionary::Ensemble;
-use crate::error::Result;
+use crate::error::{Result, ToolError};
 use crate::linear::Basis;
-use crate::model::{AtomModel, ChannelModel, CoefficientsModel, DictionaryModel, EnsembleModel, FactorModel, MaterialModel, MetadataModel, PairTableModel};
+use crate::model::{
+    AtomModel, ChannelModel, CoefficientsModel, DictionaryModel, EnsembleModel, FactorModel, MaterialModel, MetadataModel, PairTableModel, RecordModel,
+};
 use crate::quantise::{FloatRecord, quantise, quantise_means};
 use crate::transfer::matrix_q13;
-use crate::triangulate::project;
+use crate::triangulate::{project, triangulate};
+use selvedge::cost::{Shape, filtered_operations};
 use selvedge::ensemble::dequantise;
+
+/// Most quality layers (3.1).
+const LAYER_LIMIT: usize = 8;
 
 /// Means of a channel as a file holds them.
 pub type MeanTable = PairTableModel;
@@ -35,6 +42,15 @@ pub fn mean_tables(means: &[Vec<f64>; 3]) -> Result<([MeanTable; 3], [Vec<f32>; 
         decoded[c] = tables[c].entries.iter().map(|&e| ((base + e as f64 * gain) / 1_048_576.0) as f32).collect();
     }
     Ok((tables, decoded))
+}
+
+/// Operations of a filtered sample beside those of its records (4.2-1).
+pub fn fixed_operations(description: &Description) -> u64 {
+    let set = |directions: &[glam::DVec3]| triangulate(&directions.iter().map(|&d| project(d)).collect::<Vec<_>>(), None);
+    let [light, view] = [set(&description.lights), set(&description.views)];
+    let shape =
+        Shape { candidates: [light.largest_cell(), view.largest_cell()], hull_counts: [light.hull.len() as u32, view.hull.len() as u32], means: 3, scales: 0 };
+    filtered_operations(shape, 0) as u64
 }
 
 /// Columns of a basis that are used, each scaled to its largest entry.
@@ -83,12 +99,24 @@ pub fn material(setting: &Setting<'_>, ensembles: &[Ensemble; 3], candidates: &[
             rounding += lost;
         }
     }
+    // Records that overflow may have given one channel more layers than another.
+    let layers = channels.iter().flat_map(|c| c.ensemble.as_ref()).map(|e| e.coefficients[0].len()).max().unwrap_or(setting.options.layers);
+    if layers > LAYER_LIMIT {
+        let hint = "choose a smaller edge of blocks";
+        return Err(ToolError::Usage(format!("blocks of this edge need {layers} layers for this many coefficients, and {LAYER_LIMIT} are possible: {hint}")));
+    }
+    for ensemble in channels.iter_mut().flat_map(|c| c.ensemble.as_mut()) {
+        for coefficients in &mut ensemble.coefficients {
+            let empty = CoefficientsModel { value_bits: 1, records: vec![RecordModel::default(); coefficients[0].records.len()] };
+            coefficients.resize(layers, empty);
+        }
+    }
     let same = description.lights == description.views;
     let model = MaterialModel {
         size: description.size.map(|n| n as u32),
         level_count: setting.prepared.levels.len() as u32,
         edge: setting.options.edge as u32,
-        layer_count: setting.options.layers as u32,
+        layer_count: layers as u32,
         transfer: setting.prepared.forward.transfer,
         cosine_included: description.cosine_included,
         matrix_q13: matrix_q13(),
@@ -132,19 +160,20 @@ fn channel(setting: &Setting<'_>, ensemble: &Ensemble, candidates: &[&Candidates
         dictionaries.push(DictionaryModel { light, view, x, y });
         tables.push(parts);
     }
-    let layers = setting.options.layers;
+    let wished = setting.options.layers;
     // A layer has what is at least twice as large as what the next one has; the last has the rest.
     let layer_of = |value: f32| {
         let above = (value.abs() as f64 / setting.threshold.max(1e-9)).log2().max(0.0) as usize;
-        (layers - 1).saturating_sub(above)
+        (wished - 1).saturating_sub(above)
     };
     let mut records: Vec<Vec<Vec<FloatRecord>>> = Vec::new();
     for (level, candidates) in candidates.iter().enumerate() {
-        let mut of_layers: Vec<Vec<FloatRecord>> = vec![Vec::with_capacity(candidates.dictionaries.len()); layers];
+        let blocks = candidates.dictionaries.len();
+        let mut of_layers: Vec<Vec<FloatRecord>> = vec![Vec::with_capacity(blocks); wished];
         for (block, list) in selection.kept[level].iter().enumerate() {
             let k = candidates.dictionaries[block] as usize;
             let number = numbers[k];
-            let mut lists: Vec<Vec<(AtomModel, f64)>> = vec![Vec::new(); layers];
+            let mut lists: Vec<Vec<(AtomModel, f64)>> = vec![Vec::new(); wished];
             for &i in list {
                 let [light, view, x, y] = split(candidates.places[i as usize]);
                 let [of_light, of_view, of_x, of_y] = &tables[number];
@@ -154,11 +183,20 @@ fn channel(setting: &Setting<'_>, ensemble: &Ensemble, candidates: &[&Candidates
                 let value = candidates.values[i as usize];
                 lists[layer_of(value)].push((atom, value as f64 * scale * TABLE_GAIN));
             }
+            spill(&mut lists);
+            if lists.len() > of_layers.len() {
+                of_layers.resize(lists.len(), vec![(0, Vec::new()); block]);
+            }
+            lists.resize(of_layers.len(), Vec::new());
             for (records, list) in of_layers.iter_mut().zip(lists) {
                 records.push((if list.is_empty() { 0 } else { number }, list));
             }
         }
         records.push(of_layers);
+    }
+    let layers = records.iter().map(Vec::len).max().unwrap_or(wished);
+    for (records, candidates) in records.iter_mut().zip(candidates) {
+        records.resize(layers, vec![(0, Vec::new()); candidates.dictionaries.len()]);
     }
     let quantised = |bits: u32| -> Result<(EnsembleModel, f64)> {
         let (atoms, coefficients) = quantise(&records, dictionaries.len(), &vec![vec![bits; layers]; candidates.len()])?;
@@ -175,6 +213,34 @@ fn channel(setting: &Setting<'_>, ensemble: &Ensemble, candidates: &[&Candidates
     match (3..=14).min_by(|&a, &b| loss(a).total_cmp(&loss(b))) {
         Some(bits) if bits != FIRST_BITS => quantised(bits),
         _ => Ok((model, lost)),
+    }
+}
+
+/// Magnitudes that a record may state, with room for rounding (10.7-7 at a shift of zero).
+const RECORD_SUM: f64 = 2000.0;
+
+/// Moves what a record has no room for to the next layer, the smallest first, and adds layers where they run out.
+fn spill(lists: &mut Vec<Vec<(AtomModel, f64)>>) {
+    // A magnitude is rounded up to whole units, of which there are 32 in one.
+    let share = |c: &(AtomModel, f64)| c.1.abs() + 1.0 / 32.0;
+    let mut layer = 0;
+    while layer < lists.len() {
+        if lists[layer].iter().map(share).sum::<f64>() > RECORD_SUM {
+            let list = &mut lists[layer];
+            list.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()).then(a.0.word().cmp(&b.0.word())));
+            let mut sum = 0.0;
+            let room = list.iter().take_while(|c| {
+                sum += share(c);
+                sum <= RECORD_SUM
+            });
+            let kept = room.count().max(1);
+            let rest = list.split_off(kept);
+            if layer + 1 == lists.len() {
+                lists.push(Vec::new());
+            }
+            lists[layer + 1].extend(rest);
+        }
+        layer += 1;
     }
 }
 

@@ -31,6 +31,14 @@ pub struct Candidates {
     pub energy: f64,
 }
 
+impl Candidates {
+    /// The least square of each block.
+    pub fn least_squares(&self) -> impl Iterator<Item = f64> + '_ {
+        let least = |range: &[usize]| self.values[range[0]..range[1]].iter().map(|&v| (v as f64).powi(2)).fold(f64::MAX, f64::min);
+        self.starts.windows(2).filter(|range| range[0] < range[1]).map(least)
+    }
+}
+
 /// One block's share of [`Candidates`].
 struct Share {
     dictionary: u16,

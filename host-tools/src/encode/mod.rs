@@ -19,6 +19,7 @@ use crate::write::write_material;
 use assemble::{MeanTable, Setting, mean_tables};
 use candidates::{Candidates, Keep, collect};
 use select::{Channel, Selection};
+use selvedge::cost::record_operations;
 use std::f64::consts::LN_2;
 
 /// What a file has to reach.
@@ -131,69 +132,167 @@ impl Prepared<'_> {
 /// # Errors
 /// If the data cannot be read, or the goal is beyond what the format can hold.
 pub fn encode(prepared: &Prepared<'_>, ensembles: &[Ensemble; 3], options: &Options, progress: &(dyn Fn(usize, usize) + Sync)) -> Result<Encoded> {
-    if let Goal::Coefficients(counts) = options.goal {
-        let candidates = collect_levels(prepared, ensembles, options, Keep::Largest(counts), progress)?;
-        let channels: [Channel<'_>; 3] = std::array::from_fn(|c| Channel::new(candidates.iter().map(|level| &level[c]).collect(), &ensembles[c]));
-        let selections = channels.each_ref().map(Channel::all);
-        return finish(prepared, ensembles, options, &candidates, &selections, 0.0);
-    }
     let guess = match options.goal {
-        Goal::Threshold(threshold) => threshold,
-        _ => guess_threshold(prepared, ensembles, options)?,
+        Goal::Coefficients(counts) => {
+            let candidates = collect_levels(prepared, ensembles, options, Keep::Largest(counts), progress)?;
+            return Search::new(prepared, ensembles, options, &candidates).all();
+        }
+        Goal::Threshold(threshold) => {
+            let candidates = collect_levels(prepared, ensembles, options, Keep::Above(threshold as f32, threshold as f32), progress)?;
+            return Search::new(prepared, ensembles, options, &candidates).at(threshold);
+        }
+        Goal::Rms(_) | Goal::Size(_) => guess_threshold(prepared, ensembles, options)?,
     };
-    let mut least = if matches!(options.goal, Goal::Threshold(_)) { guess } else { guess * 0.6 };
-    for _ in 0..8 {
+    let mut least = guess * 0.6;
+    loop {
         let candidates = collect_levels(prepared, ensembles, options, Keep::Above(least as f32, guess as f32), progress)?;
-        let channels: [Channel<'_>; 3] = std::array::from_fn(|c| Channel::new(candidates.iter().map(|level| &level[c]).collect(), &ensembles[c]));
-        let at = |threshold: f64| -> Result<Encoded> {
-            let selections = channels.each_ref().map(|channel| channel.select(threshold as f32, COEFFICIENT_BITS, usize::MAX));
-            finish(prepared, ensembles, options, &candidates, &selections, threshold)
+        let search = Search::new(prepared, ensembles, options, &candidates);
+        let found = match options.goal {
+            Goal::Size(bytes) => search.for_size(least, bytes)?,
+            Goal::Rms(rms) => search.for_rms(least, rms)?,
+            Goal::Coefficients(_) | Goal::Threshold(_) => None,
         };
-        if let Goal::Threshold(_) = options.goal {
-            return at(guess);
+        // Nothing is found where even all that was kept leaves room: keep more, down to what is no information.
+        match found {
+            Some(encoded) => return Ok(encoded),
+            None if least < 1e-7 => return search.at(0.0),
+            None => least *= 0.5,
         }
-        let good = |encoded: &Encoded| match options.goal {
-            Goal::Size(bytes) => encoded.bytes.len() as u64 <= bytes,
-            Goal::Rms(rms) => encoded.predicted_rms > rms,
-            Goal::Coefficients(_) | Goal::Threshold(_) => true,
-        };
-        // With everything that was kept, is the file still too small (or too far from the data)?
-        let everything = at(least)?;
-        if good(&everything) {
-            if least < 1e-7 {
-                return Ok(everything);
-            }
-            least *= 0.5;
-            continue;
-        }
-        let (mut low, mut high) = (least.ln(), least.ln() + 20.0);
-        let mut best = None;
-        for _ in 0..22 {
-            let middle = (low + high) / 2.0;
-            let encoded = at(middle.exp())?;
-            // Sizes have a largest that is good, errors a smallest that is bad: the last file on the right side counts.
-            match (good(&encoded), options.goal) {
-                (true, Goal::Size(_)) => {
-                    high = middle;
-                    best = Some(encoded);
-                }
-                (true, _) => high = middle,
-                (false, Goal::Size(_)) => low = middle,
-                (false, _) => {
-                    low = middle;
-                    best = Some(encoded);
-                }
-            }
-            if high - low < 2e-3 && best.is_some() {
-                break;
-            }
-        }
-        return best.ok_or_else(|| match options.goal {
-            Goal::Size(bytes) => ToolError::Usage(format!("{bytes} bytes are too few even without texture")),
-            _ => ToolError::Usage("this error cannot be reached".into()),
-        });
     }
-    Err(ToolError::Usage("the goal is beyond the data".into()))
+}
+
+/// Candidates of all levels, and thresholds tried on them.
+struct Search<'a> {
+    prepared: &'a Prepared<'a>,
+    ensembles: &'a [Ensemble; 3],
+    options: &'a Options,
+    candidates: &'a [[Candidates; 3]],
+    channels: [Channel<'a>; 3],
+}
+
+impl<'a> Search<'a> {
+    fn new(prepared: &'a Prepared<'a>, ensembles: &'a [Ensemble; 3], options: &'a Options, candidates: &'a [[Candidates; 3]]) -> Search<'a> {
+        let channels = std::array::from_fn(|c| Channel::new(candidates.iter().map(|level| &level[c]).collect(), &ensembles[c]));
+        Search { prepared, ensembles, options, candidates, channels }
+    }
+
+    /// Selections at a threshold, within the cap of operations.
+    fn select(&self, threshold: f64) -> Result<[Selection; 3]> {
+        self.capped(|channel, most| channel.select(threshold as f32, COEFFICIENT_BITS, most))
+    }
+
+    /// The largest records shrink together until the cap holds.
+    fn capped(&self, select: impl Fn(&Channel<'a>, usize) -> Selection) -> Result<[Selection; 3]> {
+        let selections = self.channels.each_ref().map(|channel| select(channel, usize::MAX));
+        let Some(cap) = self.options.operations else { return Ok(selections) };
+        let largest = selections.each_ref().map(Channel::largest_record);
+        let edge = self.options.edge as u32;
+        let fixed = assemble::fixed_operations(self.prepared.levels[0].description());
+        let cost = |part: f64| {
+            let of = |n: usize| record_operations((n as f64 * part) as u32, edge);
+            // A channel without coefficients has no records.
+            fixed + 4 * largest.into_iter().filter(|&n| n > 0).map(of).sum::<u64>()
+        };
+        if cost(1.0) <= cap as u64 {
+            return Ok(selections);
+        }
+        if cost(0.0) > cap as u64 {
+            return Err(ToolError::Usage(format!("{cap} operations are too few: without a coefficient a sample states {}", cost(0.0))));
+        }
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..20 {
+            let middle = (low + high) / 2.0;
+            if cost(middle) <= cap as u64 { low = middle } else { high = middle }
+        }
+        Ok(std::array::from_fn(|c| select(&self.channels[c], (largest[c] as f64 * low) as usize)))
+    }
+
+    fn all(&self) -> Result<Encoded> {
+        let selections = self.capped(|channel, most| channel.all(most))?;
+        // What the least kept coefficient is worth, on average, sets the price of a bit.
+        let squares: Vec<f64> = self.candidates[0].iter().flat_map(Candidates::least_squares).collect();
+        let threshold = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
+        finish(self.prepared, self.ensembles, self.options, self.candidates, &selections, threshold)
+    }
+
+    fn at(&self, threshold: f64) -> Result<Encoded> {
+        finish(self.prepared, self.ensembles, self.options, self.candidates, &self.select(threshold)?, threshold)
+    }
+
+    /// The largest file within `bytes`, or `None` if all candidates make a smaller one.
+    fn for_size(&self, least: f64, bytes: u64) -> Result<Option<Encoded>> {
+        let everything = self.at(least)?;
+        if everything.bytes.len() as u64 <= bytes {
+            return Ok(None);
+        }
+        // Log of size over log of threshold is nearly straight, so a secant between the two sides finds the goal soon.
+        let goal = (bytes as f64).ln();
+        let (mut low, mut low_value) = (least.ln(), (everything.bytes.len() as f64).ln());
+        let (mut high, mut high_value) = (low + 0.7, f64::NAN);
+        let mut best: Option<Encoded> = None;
+        for _ in 0..40 {
+            let next = if high_value.is_nan() { high } else { (low + (low_value - goal) / (low_value - high_value) * (high - low)).clamp(low, high) };
+            let encoded = self.at(next.exp())?;
+            let value = (encoded.bytes.len() as f64).ln();
+            if value <= goal {
+                (high, high_value) = (next, value);
+                let near = goal - value < 2e-3;
+                best = Some(encoded);
+                if near || high - low < 1e-4 {
+                    break;
+                }
+                // From inside, so that the other side moves too.
+                low_value = goal + (low_value - goal) * 0.5;
+            } else {
+                (low, low_value) = (next, value);
+                match high_value.is_nan() {
+                    true if next > least.ln() + 25.0 => break,
+                    true => high = next + 0.7,
+                    false => high_value = goal + (high_value - goal) * 0.5,
+                }
+            }
+        }
+        let too_few = || ToolError::Usage(format!("{bytes} bytes are too few even without texture"));
+        best.map(Some).ok_or_else(too_few)
+    }
+
+    /// The smallest file of at most this error, or `None` if all candidates leave a larger one.
+    fn for_rms(&self, least: f64, rms: f64) -> Result<Option<Encoded>> {
+        let goal = (rms / self.prepared.unit()).powi(2) * self.prepared.values(self.options.edge);
+        let lost = |threshold: f64| -> Result<f64> { Ok(self.select(threshold)?.iter().map(|s| s.lost_at_0).sum()) };
+        // Share of the error that rounding of values makes; learnt from the file before.
+        let mut rounding = 0.2;
+        let mut best: Option<Encoded> = None;
+        for _ in 0..4 {
+            let target = goal / (1.0 + rounding);
+            if lost(least)? > target {
+                return Ok(best);
+            }
+            let (mut low, mut high) = (least.ln(), least.ln() + 25.0);
+            for _ in 0..24 {
+                let middle = (low + high) / 2.0;
+                if lost(middle.exp())? <= target { low = middle } else { high = middle }
+            }
+            let encoded = self.at(low.exp())?;
+            let lost = lost(low.exp())?;
+            let total = (encoded.predicted_rms / self.prepared.unit()).powi(2) * self.prepared.values(self.options.edge);
+            rounding = if lost > 0.0 { (total - lost) / lost } else { 0.0 };
+            let (reached, near) = (total <= goal, (total - goal).abs() < 0.01 * goal);
+            if reached {
+                best = Some(encoded);
+                if near {
+                    break;
+                }
+            } else {
+                // A little to spare, so that the next one is on the right side.
+                rounding *= 1.01;
+            }
+        }
+        match best {
+            Some(best) => Ok(Some(best)),
+            None => Ok(None),
+        }
+    }
 }
 
 /// What a coefficient costs on average: its value and its position.

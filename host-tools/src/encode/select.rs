@@ -6,6 +6,7 @@
 
 use super::candidates::Candidates;
 use crate::dictionary::Ensemble;
+use selvedge::ensemble_set::ATOM_LIMIT;
 
 /// Bits of an atom's two words (10.2).
 const ATOM_BITS: f64 = 64.0;
@@ -100,12 +101,30 @@ impl<'a> Channel<'a> {
                 break;
             }
         }
+        self.limit_atoms(&gains, &mut alive);
         self.keep(|value, atom| value.abs() >= threshold && alive[atom], most)
     }
 
-    /// Every candidate.
-    pub fn all(&self) -> Selection {
-        self.keep(|_, _| true, usize::MAX)
+    /// Every candidate, within the largest record that is allowed.
+    pub fn all(&self, most: usize) -> Selection {
+        let mut gains = vec![0.0f64; self.keys.len()];
+        for (candidates, atoms) in self.levels.iter().zip(&self.atoms) {
+            candidates.values.iter().zip(atoms).for_each(|(&value, &atom)| gains[atom as usize] += (value as f64).powi(2));
+        }
+        let mut alive = vec![true; self.keys.len()];
+        self.limit_atoms(&gains, &mut alive);
+        self.keep(|_, atom| alive[atom], most)
+    }
+
+    /// A dictionary has room for so many atoms: the best.
+    fn limit_atoms(&self, gains: &[f64], alive: &mut [bool]) {
+        for k in 0..self.dictionaries {
+            let mut of_k: Vec<usize> = (0..alive.len()).filter(|&i| alive[i] && self.keys[i].0 as usize == k).collect();
+            if of_k.len() > ATOM_LIMIT as usize {
+                of_k.sort_by(|&a, &b| gains[b].total_cmp(&gains[a]).then(a.cmp(&b)));
+                of_k[ATOM_LIMIT as usize..].iter().for_each(|&i| alive[i] = false);
+            }
+        }
     }
 
     fn keep(&self, keep: impl Fn(f32, usize) -> bool, most: usize) -> Selection {
