@@ -49,6 +49,15 @@ impl Ensemble {
         self.turns[0].x.rows
     }
 
+    /// The same angular bases with cosines over blocks of another edge; the ensemble itself if it has that edge.
+    pub fn with_edge(&self, edge: usize) -> Ensemble {
+        if edge == self.edge() {
+            return self.clone();
+        }
+        let turns = self.turns.iter().map(|turn| Turn { x: Basis::cosine(edge), y: Basis::cosine(edge), ..turn.clone() }).collect();
+        Ensemble { turns, ..self.clone() }
+    }
+
     /// Numbers of a core and of a tensor of coefficients: `[y][x][view column][light column]`.
     pub fn core_len(&self) -> usize {
         self.edge() * self.edge() * self.light.columns * self.view.columns

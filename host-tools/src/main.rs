@@ -2,6 +2,8 @@
 //!
 //! Exit codes: 0 good, 1 bad usage, 2 I/O, 3 invalid file, 4 over limits, 5 unsupported.
 
+mod commands;
+
 use clap::{Args, Parser, Subcommand};
 use selvedge::header::CONTENT_DICTIONARY;
 use selvedge::{Direction, Limits};
@@ -26,9 +28,10 @@ enum Command {
         #[arg(long)]
         out: PathBuf,
     },
-    /// Make a file of a folder of SparseBTF .bin files, without encoding anew
+    /// Make a dataset of a folder of images, or a file of a folder of SparseBTF .bin files without encoding anew
     Import {
-        /// Folder with Coeffs_BTF_NAME_1e-05_{Y,U,V}.bin, DictEnsOrth4D*.bin, NAME_mean_std.bin and xyz_loc.bin
+        /// Folder with images named tlTTT_plPPP_tvTTT_pvPPP (.exr, .png) or listed in dataset.json; or with
+        /// Coeffs_BTF_NAME_1e-05_{Y,U,V}.bin, DictEnsOrth4D*.bin, NAME_mean_std.bin and xyz_loc.bin
         folder: PathBuf,
         /// The material, if the folder has several
         #[arg(long)]
@@ -45,7 +48,11 @@ enum Command {
         /// Put the dictionaries into a file of their own
         #[arg(long)]
         dictionary: Option<PathBuf>,
+        #[command(flatten)]
+        images: commands::ImageArgs,
     },
+    #[command(flatten)]
+    Material(commands::Material),
     /// Say what a file is
     Info {
         #[command(flatten)]
@@ -230,7 +237,11 @@ fn validate(paths: &[PathBuf], dictionary: Option<&Path>, limits: &Limits, json:
 fn run(cli: Cli) -> Result<u8> {
     match cli.command {
         Command::Demo { out } => demo::run(&out, &mut |line| eprintln!("{line}")).map(|()| 0),
-        Command::Import { folder, material, blocks, value_bits, output, dictionary } => {
+        Command::Material(command) => commands::run(command),
+        Command::Import { folder, output, images, .. } if sparsebtf::materials_in(&folder)?.is_empty() => {
+            commands::import_images(&folder, &output, images).map(|()| 0)
+        }
+        Command::Import { folder, material, blocks, value_bits, output, dictionary, .. } => {
             import(&folder, material, blocks, value_bits, &output, dictionary.as_deref()).map(|()| 0)
         }
         Command::Info { source, json } => with_material(&source, |material| {

@@ -3,7 +3,7 @@
 //! Errors are of linear radiance and of `ln(x + e)`, where `e` is one thousandth of the reference's mean, the same for
 //! everything that is compared with that reference. Files are decoded by the core, at the directions of the reference.
 
-use crate::dataset::{Dataset, Description};
+use crate::dataset::{Dataset, Description, Statistics};
 use crate::error::{Result, ToolError};
 use crate::linear::ordered;
 use crate::transfer::log2;
@@ -76,6 +76,51 @@ const BUDGET: usize = 1 << 23;
 pub fn query(direction: glam::DVec3) -> Direction {
     let [x, y] = project(direction);
     Direction { x_q18: x << 4, y_q18: y << 4, z_q15: cosine_of(x, y) as i32 }
+}
+
+/// What a file says of itself, as a reference: its size and the directions of its points.
+pub fn describe(file: &Selvedge<'_>) -> Description {
+    let header = file.header();
+    // The inverse of the projection x / (1 + z).
+    let vector = |d: Direction| {
+        let p = glam::DVec2::new(d.x_q18 as f64, d.y_q18 as f64) / 262_144.0;
+        let scale = 1.0 + p.length_squared();
+        glam::DVec3::new(2.0 * p.x / scale, 2.0 * p.y / scale, ((1.0 - p.length_squared()) / scale).max(0.0))
+    };
+    Description {
+        size: file.image_size(0).map(|n| n as usize),
+        lights: (0..header.light_count).map(|i| vector(file.light_direction(i))).collect(),
+        views: (0..header.view_count).map(|i| vector(file.view_direction(i))).collect(),
+        ..Description::default()
+    }
+}
+
+/// The offset by which errors against a file are measured: one thousandth of its mean over lights at its first view.
+pub fn log_offset(file: &Selvedge<'_>) -> f32 {
+    let description = describe(file);
+    let mut images_at = Vec::new();
+    let mut statistics = Statistics::default();
+    if images(Source::File(file, 0), &description, 0, 0..description.lights.len(), &mut images_at).is_ok() {
+        let count = images_at.len().max(1) as f64;
+        statistics.mean = std::array::from_fn(|c| images_at.iter().map(|rgb| rgb[c] as f64).sum::<f64>() / count);
+    }
+    statistics.log_offset()
+}
+
+/// The direction of a set that is nearest to a query.
+pub fn nearest(set: &[glam::DVec3], asked: Direction) -> usize {
+    let distance = |d: &glam::DVec3| {
+        let q = query(*d);
+        ((q.x_q18 - asked.x_q18) as i64).pow(2) + ((q.y_q18 - asked.y_q18) as i64).pow(2)
+    };
+    (0..set.len()).min_by_key(|&i| distance(&set[i])).unwrap_or(0)
+}
+
+/// The image of one pair of a reference's directions, row by row.
+pub fn image(source: Source<'_>, description: &Description, light: usize, view: usize) -> Result<Vec<[f32; 3]>> {
+    let mut out = Vec::new();
+    images(source, description, view, light..light + 1, &mut out)?;
+    Ok(out)
 }
 
 /// Radiance of a source at one view and a range of lights: `[light][texel]`.

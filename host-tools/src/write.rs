@@ -52,13 +52,19 @@ pub fn write_material(model: &MaterialModel) -> Vec<u8> {
 
 /// A dictionary file and the material that names it.
 pub fn write_split(model: &MaterialModel) -> (Vec<u8>, Vec<u8>) {
-    let dictionary = dictionary_file(model);
-    (material_file(model, Some(&dictionary)), dictionary)
+    let dictionary = write_dictionary(&MaterialModel { extras: Vec::new(), ..model.clone() });
+    (material_file(model, Some((&dictionary, false))), dictionary)
 }
 
-fn material_file(model: &MaterialModel, external: Option<&[u8]>) -> Vec<u8> {
+/// A material that names a dictionary file, whose angular factors its model repeats; its spatial factors are in the
+/// dictionary, or its own.
+pub fn write_with_dictionary(model: &MaterialModel, dictionary: &[u8], own_spatial: bool) -> Vec<u8> {
+    material_file(model, Some((dictionary, own_spatial)))
+}
+
+fn material_file(model: &MaterialModel, external: Option<(&[u8], bool)>) -> Vec<u8> {
     let mut parts = vec![metadata_part(&model.metadata)];
-    if let Some(dictionary) = external {
+    if let Some((dictionary, _)) = external {
         let mut bytes = sha256(dictionary).to_vec();
         bytes.extend(words_to_bytes(&[dictionary.len() as u32, 0, 0, 0]));
         parts.push(Part { kind: EXTERNAL, instance: 0, bytes });
@@ -78,9 +84,12 @@ fn material_file(model: &MaterialModel, external: Option<&[u8]>) -> Vec<u8> {
         }
     }
     let ensembles: Vec<(u32, &EnsembleModel)> = (0u32..).zip(&model.channels).filter_map(|(c, channel)| Some((c, channel.ensemble.as_ref()?))).collect();
-    if external.is_none() {
-        parts.extend(factor_parts(&ensembles));
-    }
+    let kinds: &[u32] = match external {
+        None => &[ANGULAR, SPATIAL],
+        Some((_, true)) => &[SPATIAL],
+        Some((_, false)) => &[],
+    };
+    parts.extend(factor_parts(&ensembles, kinds));
     parts.extend(ensembles.iter().map(|&(c, ensemble)| atoms_part(c, ensemble)));
     let mut records = 0;
     for level in 0..model.level_count {
@@ -96,7 +105,7 @@ fn material_file(model: &MaterialModel, external: Option<&[u8]>) -> Vec<u8> {
         }
         records = records.max(at_level);
     }
-    parts.extend(model.extras.iter().map(|(kind, instance, bytes)| Part { kind: *kind as u32, instance: *instance as u32, bytes: bytes.clone() }));
+    parts.extend(extra_parts(model));
 
     let view = view.as_ref().unwrap_or(&light);
     let states = [0, 1, 2].map(|c| model.channels[c].state());
@@ -124,10 +133,12 @@ fn material_file(model: &MaterialModel, external: Option<&[u8]>) -> Vec<u8> {
     lay_out(header, parts)
 }
 
-fn dictionary_file(model: &MaterialModel) -> Vec<u8> {
+/// A dictionary file: the factors of a model, its name and its optional sections.
+pub fn write_dictionary(model: &MaterialModel) -> Vec<u8> {
     let mut parts = vec![metadata_part(&model.metadata)];
     let ensembles: Vec<(u32, &EnsembleModel)> = (0u32..).zip(&model.channels).filter_map(|(c, channel)| Some((c, channel.ensemble.as_ref()?))).collect();
-    parts.extend(factor_parts(&ensembles));
+    parts.extend(factor_parts(&ensembles, &[ANGULAR, SPATIAL]));
+    parts.extend(extra_parts(model));
     let states = [0, 1, 2].map(|c| if model.channels[c].ensemble.is_some() { 2 } else { 0 });
     let mut header = header_words(CONTENT_DICTIONARY, model, states);
     header[8] = 1;
@@ -233,10 +244,14 @@ fn pair_table_part(kind: u32, channel: u32, table: &PairTableModel, light_count:
     Part { kind, instance: channel, bytes: words_to_bytes(&words) }
 }
 
-fn factor_parts(ensembles: &[(u32, &EnsembleModel)]) -> Vec<Part> {
+fn extra_parts(model: &MaterialModel) -> impl Iterator<Item = Part> + '_ {
+    model.extras.iter().map(|(kind, instance, bytes)| Part { kind: *kind as u32, instance: *instance as u32, bytes: bytes.clone() })
+}
+
+fn factor_parts(ensembles: &[(u32, &EnsembleModel)], kinds: &[u32]) -> Vec<Part> {
     let mut parts = Vec::new();
     for &(c, ensemble) in ensembles {
-        for kind in [ANGULAR, SPATIAL] {
+        for &kind in kinds {
             let pairs: Vec<[&FactorModel; 2]> =
                 ensemble.dictionaries.iter().map(|d| if kind == ANGULAR { [&d.light, &d.view] } else { [&d.x, &d.y] }).collect();
             let mut words = vec![pairs.len() as u32, 0];

@@ -66,6 +66,15 @@ struct Used {
 const UNUSED: u32 = u32::MAX;
 
 impl Used {
+    /// All columns of a table as they are.
+    fn whole(factor: &FactorModel) -> Used {
+        let columns = factor.columns as usize;
+        let squares = |c: usize| factor.entries.iter().skip(c).step_by(columns).map(|&e| (e as f64).powi(2)).sum::<f64>();
+        // The entry that stands for one, over the length of the column: entries are those of a unit vector over this.
+        let scale = (0..columns).map(|c| 32_767.0 / squares(c).sqrt().max(1e-9)).collect();
+        Used { factor: factor.clone(), number: (0..factor.columns).collect(), scale }
+    }
+
     fn new(basis: &Basis, used: &[bool]) -> Used {
         let mut number = vec![UNUSED; basis.columns];
         let mut scales = Vec::new();
@@ -151,11 +160,20 @@ fn channel(setting: &Setting<'_>, ensemble: &Ensemble, candidates: &[&Candidates
     let mut numbers = vec![usize::MAX; ensemble.turns.len()];
     let mut dictionaries = Vec::new();
     let mut tables: Vec<[Used; 4]> = Vec::new();
-    for (k, flags) in used.iter().enumerate().filter(|(_, flags)| flags[0].contains(&true)) {
+    // A dictionary of its own file keeps all its columns and its place.
+    let external = ensemble.tables.as_ref().filter(|_| setting.options.external.is_some());
+    for (k, flags) in used.iter().enumerate().filter(|(_, flags)| external.is_some() || flags[0].contains(&true)) {
         numbers[k] = dictionaries.len();
-        let [light, view] = ensemble.angular(k);
         let turn = &ensemble.turns[k];
-        let parts = [Used::new(&light, &flags[0]), Used::new(&view, &flags[1]), Used::new(&turn.x, &flags[2]), Used::new(&turn.y, &flags[3])];
+        let all = vec![true; edge];
+        let parts = match external.map(|tables| &tables[k]) {
+            Some(table) if table.x.columns as usize == edge => [&table.light, &table.view, &table.x, &table.y].map(Used::whole),
+            Some(table) => [Used::whole(&table.light), Used::whole(&table.view), Used::new(&turn.x, &all), Used::new(&turn.y, &all)],
+            None => {
+                let [light, view] = ensemble.angular(k);
+                [Used::new(&light, &flags[0]), Used::new(&view, &flags[1]), Used::new(&turn.x, &flags[2]), Used::new(&turn.y, &flags[3])]
+            }
+        };
         let [light, view, x, y] = parts.each_ref().map(|part| part.factor.clone());
         dictionaries.push(DictionaryModel { light, view, x, y });
         tables.push(parts);

@@ -6,6 +6,7 @@
 
 pub mod assemble;
 pub mod candidates;
+pub mod driver;
 pub mod select;
 
 use crate::blocks::{Blocks, Moments, moments};
@@ -15,12 +16,13 @@ use crate::error::{Result, ToolError};
 use crate::linear::{Basis, eigenbasis};
 use crate::model::{MaterialModel, TransferModel};
 use crate::transfer::Forward;
-use crate::write::write_material;
+use crate::write::{write_material, write_with_dictionary};
 use assemble::{MeanTable, Setting, mean_tables};
 use candidates::{Candidates, Keep, collect};
 use select::{Channel, Selection};
 use selvedge::cost::record_operations;
 use std::f64::consts::LN_2;
+use std::sync::Arc;
 
 /// What a file has to reach.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,15 +48,16 @@ pub struct Options {
     pub operations: Option<u32>,
     /// Quality layers.
     pub layers: usize,
-    /// Levels of detail.
-    pub levels: usize,
     /// Bits of a value in each channel; chosen by their worth if `None`.
     pub value_bits: Option<[u32; 3]>,
+    /// A dictionary file that the material shall name instead of carrying its columns. The ensembles are those that
+    /// were read from it, with their own spatial bases where the edge is another.
+    pub external: Option<Arc<[u8]>>,
 }
 
 impl Default for Options {
     fn default() -> Options {
-        Options { edge: 4, goal: Goal::Rms(0.2), operations: None, layers: 1, levels: 1, value_bits: None }
+        Options { edge: 4, goal: Goal::Rms(0.2), operations: None, layers: 1, value_bits: None, external: None }
     }
 }
 
@@ -351,7 +354,13 @@ fn finish(
 ) -> Result<Encoded> {
     let setting = Setting { prepared, options, threshold };
     let (model, rounding) = assemble::material(&setting, ensembles, candidates, selections)?;
-    let bytes = write_material(&model);
+    let bytes = match &options.external {
+        Some(dictionary) => {
+            let same_edge = ensembles.iter().all(|e| e.tables.as_ref().is_some_and(|t| t[0].x.entries.len() == options.edge * options.edge));
+            write_with_dictionary(&model, dictionary, !same_edge)
+        }
+        None => write_material(&model),
+    };
     let lost: f64 = selections.iter().map(|selection| selection.lost_at_0).sum();
     let predicted_rms = prepared.unit() * ((lost + rounding) / prepared.values(options.edge)).sqrt();
     let coefficients = selections.each_ref().map(|selection| selection.kept[0].iter().map(Vec::len).sum());

@@ -1,0 +1,760 @@
+//! The commands that make, compare and change files of materials: their options, and what they do with them.
+
+use crate::{Source as FileSource, parse_angles, print, print_json};
+use clap::{Args, Subcommand, ValueEnum};
+use selvedge::{Direction, Limits, Selvedge};
+use selvedge_tools::blend::{Blend, blend};
+use selvedge_tools::dataset::{Dataset, Description, Sample};
+use selvedge_tools::dictionary::Ensemble;
+use selvedge_tools::dictionary_file::{self, Training};
+use selvedge_tools::encode::driver::{Event, Wish, encode_verified};
+use selvedge_tools::encode::{Options, prepare};
+use selvedge_tools::error::{Result, ToolError};
+use selvedge_tools::folder::{self, ImportOptions};
+use selvedge_tools::measure::{self, Metrics, Source};
+use selvedge_tools::model::{MetadataModel, TransferModel};
+use selvedge_tools::progress::Progress;
+use selvedge_tools::sector::Sector;
+use selvedge_tools::synth::{self, Mesostructure};
+use selvedge_tools::trim::{Keep, Trim, trim};
+use selvedge_tools::{files, measure::Place, picture, pyramid, read, train, write};
+use std::path::{Path, PathBuf};
+
+/// Commands of this module.
+#[derive(Subcommand)]
+pub enum Material {
+    /// Render a BTF of a modelled mesostructure into a dataset
+    Synth(SynthArgs),
+    /// Write the images of a dataset as a folder of EXR or PNG
+    Export(ExportArgs),
+    /// Train an ensemble of dictionaries on datasets, once, for materials that are not among them
+    Train(TrainArgs),
+    /// Encode a dataset for a goal in error, bytes or coefficients
+    Encode(Box<EncodeArgs>),
+    /// Compare two materials; exit codes as idiff: 0 same, 1 warning, 2 failure, 3 other sizes, 4 unreadable
+    #[command(after_help = "Exit codes: 0 within the limits, 1 beyond --warn, 2 beyond --fail, 3 other sizes, 4 unreadable.")]
+    Compare(CompareArgs),
+    /// Leave out what a scene does not need; what is left decodes to the same bits
+    Trim(TrimArgs),
+    /// A material between two, in the space of their coefficients
+    Blend(BlendArgs),
+}
+
+fn parse_size(text: &str) -> std::result::Result<[usize; 2], String> {
+    let parts: Option<Vec<usize>> = text.split('x').map(|n| n.parse().ok().filter(|n| (1..=16_384).contains(n))).collect();
+    match parts.as_deref() {
+        Some(&[side]) => Ok([side, side]),
+        Some(&[width, height]) => Ok([width, height]),
+        _ => Err("one number, or two as 128x64, from 1 to 16384".into()),
+    }
+}
+
+fn parse_three<T: std::str::FromStr + Copy>(text: &str) -> std::result::Result<[T; 3], String> {
+    let parts: Option<Vec<T>> = text.split(',').map(|n| n.trim().parse().ok()).collect();
+    match parts.as_deref() {
+        Some(&[all]) => Ok([all; 3]),
+        Some(&[a, b, c]) => Ok([a, b, c]),
+        _ => Err("one number, or three as 256,64,64".into()),
+    }
+}
+
+fn parse_counts(text: &str) -> std::result::Result<[usize; 3], String> {
+    parse_three::<usize>(text)?
+        .map(|n| (1..=32_767).contains(&n).then_some(n))
+        .into_iter()
+        .collect::<Option<Vec<_>>>()
+        .and_then(|v| v.try_into().ok())
+        .ok_or_else(|| "1 to 32767".into())
+}
+
+fn parse_positive(text: &str) -> std::result::Result<f64, String> {
+    text.parse().ok().filter(|v: &f64| v.is_finite() && *v > 0.0).ok_or_else(|| "a positive number".into())
+}
+
+fn parse_bytes(text: &str) -> std::result::Result<u64, String> {
+    let (number, unit) = text.split_at(text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len()));
+    let unit = match unit {
+        "" | "B" => 1.0,
+        "k" | "kB" => 1e3,
+        "M" | "MB" => 1e6,
+        _ => return Err("bytes, as 200000, 200k or 1.5M".into()),
+    };
+    number.parse::<f64>().ok().map(|n| n * unit).filter(|n| (1.0..=4.2e9).contains(n)).map(|n| n as u64).ok_or_else(|| "bytes, as 200000, 200k or 1.5M".into())
+}
+
+/// Threads of the work that follows; results do not depend on it.
+#[derive(Args)]
+pub struct Threads {
+    /// Threads; all cores if not given. Changes no byte
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+impl Threads {
+    fn apply(&self) {
+        if let Some(threads) = self.threads {
+            // Fails only where a pool is there already, which no command makes before.
+            let _ = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build_global();
+        }
+    }
+}
+
+#[derive(Args)]
+pub struct SynthArgs {
+    /// checker, rings, tissue, cloth, knit or hammered
+    kind: String,
+    /// The dataset to write, NAME.selvset
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Texels along the sides, as 128 or 128x64
+    #[arg(long, default_value = "128", value_parser = parse_size)]
+    size: [usize; 2],
+    /// Directions of light and of view: 81 or 151
+    #[arg(long, default_value_t = 81)]
+    directions: usize,
+    /// Rays of a texel and view: 1, 4, 9 or 16
+    #[arg(long, default_value_t = 4)]
+    samples: usize,
+    /// Chooses the geometry
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// 32-bit floats instead of binary16
+    #[arg(long)]
+    float: bool,
+    #[command(flatten)]
+    threads: Threads,
+}
+
+/// Renders a material.
+fn synthesise(args: SynthArgs) -> Result<u8> {
+    args.threads.apply();
+    let kind: Mesostructure = args.kind.parse()?;
+    let sample = if args.float { Sample::Float } else { Sample::Half };
+    let request = synth::Request { kind, size: args.size, directions: args.directions, seed: args.seed, samples: args.samples, sample };
+    let progress = Progress::new();
+    synth::synthesise(&request, &args.output, &|done, all| progress.tell("rendering", done, all))?;
+    progress.clear();
+    Ok(0)
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum ImageFormat {
+    Exr,
+    Png,
+}
+
+#[derive(Args)]
+pub struct ExportArgs {
+    /// The dataset
+    dataset: PathBuf,
+    /// The folder to write images and dataset.json into
+    #[arg(short, long)]
+    output: PathBuf,
+    /// exr keeps every bit; png is sRGB of 16 bits and cuts values above 1
+    #[arg(long, value_enum, default_value = "exr")]
+    format: ImageFormat,
+}
+
+fn export(args: ExportArgs) -> Result<u8> {
+    let dataset = Dataset::open(&args.dataset)?;
+    let format = match args.format {
+        ImageFormat::Exr => folder::Format::Exr,
+        ImageFormat::Png => folder::Format::Png,
+    };
+    let progress = Progress::new();
+    let cut = folder::export(&dataset, &args.output, format, MEMORY, &|done, all| progress.tell("writing", done, all))?;
+    progress.clear();
+    if cut > 0 {
+        eprintln!("{cut} values above 1 were cut");
+    }
+    Ok(0)
+}
+
+/// Bytes of images held at once.
+const MEMORY: usize = 256 << 20;
+
+/// Options of importing a folder of images.
+#[derive(Args)]
+pub struct ImageArgs {
+    /// Images: keep 32-bit floats instead of binary16
+    #[arg(long)]
+    float: bool,
+    /// Images: values do not contain the cosine of the light's angle
+    #[arg(long)]
+    without_cosine: bool,
+    /// Images: name of the material; that of the folder if not given
+    #[arg(long)]
+    name: Option<String>,
+    /// Images: where the data are from
+    #[arg(long, default_value = "")]
+    origin: String,
+    /// Images: licence of the data
+    #[arg(long, default_value = "")]
+    licence: String,
+}
+
+/// Imports a folder of images.
+pub fn import_images(from: &Path, output: &Path, args: ImageArgs) -> Result<()> {
+    let of_folder = || from.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let options = ImportOptions {
+        sample: if args.float { Sample::Float } else { Sample::Half },
+        cosine_included: !args.without_cosine,
+        name: args.name.unwrap_or_else(of_folder),
+        origin: args.origin,
+        licence: args.licence,
+        memory: MEMORY,
+    };
+    let progress = Progress::new();
+    folder::import(from, output, &options, &|done, all| progress.tell("reading", done, all))?;
+    progress.clear();
+    Ok(())
+}
+
+#[derive(Args)]
+pub struct TrainArgs {
+    /// Datasets with the same directions
+    #[arg(required = true)]
+    datasets: Vec<PathBuf>,
+    /// The dictionary to write, NAME.selvdict
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Dictionaries of each channel, 1 to 256
+    #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..=256))]
+    dictionaries: u16,
+    /// Coefficients of a block in each channel while training
+    #[arg(long, default_value = "256,32,32", value_parser = parse_counts)]
+    sparsity: [usize; 3],
+    /// Texels along the side of a block, 1 to 16
+    #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..=16))]
+    edge: u16,
+    /// Columns of light and view that are trained
+    #[arg(long, default_value_t = 48, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    subspace: u16,
+    /// Blocks to train on, of all datasets together
+    #[arg(long, default_value_t = 2880, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    blocks: u32,
+    /// Most iterations of each channel
+    #[arg(long, default_value_t = 40, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    iterations: u32,
+    /// Chooses the blocks
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Say nothing of the objective
+    #[arg(long)]
+    quiet: bool,
+    #[command(flatten)]
+    threads: Threads,
+}
+
+/// Trains; what an interrupted run has done is kept beside the output and continued.
+fn train_dictionary(args: TrainArgs) -> Result<u8> {
+    args.threads.apply();
+    let datasets: Vec<Dataset> = args.datasets.iter().map(|path| Dataset::open(path)).collect::<Result<_>>()?;
+    let options = train::Options {
+        dictionaries: args.dictionaries as usize,
+        sparsity: args.sparsity,
+        edge: args.edge as usize,
+        subspace: args.subspace as usize,
+        blocks: args.blocks as usize,
+        iterations: args.iterations as usize,
+        seed: args.seed,
+        ..train::Options::default()
+    };
+    let mut state = args.output.clone().into_os_string();
+    state.push(".training");
+    let state = PathBuf::from(state);
+    if state.exists() && !args.quiet {
+        eprintln!("continuing {}", state.display());
+    }
+    let begun = std::time::Instant::now();
+    let mut steps = 0u32;
+    let mut tell = |step: train::Step| {
+        steps += 1;
+        if !args.quiet {
+            let passed = begun.elapsed().as_secs_f64();
+            let left = ((3 - step.channel) * options.iterations).saturating_sub(step.iteration + 1);
+            let revived = if step.revived > 0 { format!(", {} dictionaries begin anew", step.revived) } else { String::new() };
+            let most = passed / steps as f64 * left as f64;
+            eprintln!("channel {} iteration {:2}: error {:.6} of the energy{revived}; at most {most:.0} s left", step.channel, step.iteration, step.objective);
+        }
+        true
+    };
+    let references: Vec<&Dataset> = datasets.iter().collect();
+    let Some(trained) = train::train(&references, &options, Some(&state), &mut tell)? else { return Ok(0) };
+    let description = datasets[0].description();
+    let materials: Vec<String> = datasets.iter().map(|d| d.description().texts[0].clone()).collect();
+    let name = args.output.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+    let metadata = MetadataModel { texts: [name, format!("trained on {}", materials.join(", ")), licences(&datasets)], ..MetadataModel::default() };
+    let training = Training {
+        lights: description.lights.clone(),
+        views: description.views.clone(),
+        options,
+        materials,
+        objectives: trained.objectives.clone(),
+        members: trained.members.clone(),
+    };
+    files::write(&args.output, &dictionary_file::to_bytes(&trained, &training, metadata))?;
+    Ok(0)
+}
+
+fn licences(datasets: &[Dataset]) -> String {
+    let mut all: Vec<&str> = datasets.iter().map(|d| d.description().texts[2].as_str()).collect();
+    all.sort_unstable();
+    all.dedup();
+    all.join("; ")
+}
+
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum Domain {
+    /// ln(x + a thousandth of the mean)
+    Log,
+    /// Linear radiance
+    Linear,
+}
+
+#[derive(Args)]
+pub struct EncodeArgs {
+    /// The dataset
+    dataset: PathBuf,
+    /// The file to write
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Goal: root mean squared error, in the domain of --domain
+    #[arg(long, value_parser = parse_positive, group = "goal")]
+    rmse: Option<f64>,
+    /// Goal: peak signal to noise ratio of linear radiance against the largest value, decibels
+    #[arg(long, value_parser = parse_positive, group = "goal")]
+    psnr: Option<f64>,
+    /// Goal: bytes of the file, as 200000, 200k or 1.5M
+    #[arg(long, value_parser = parse_bytes, group = "goal")]
+    size: Option<u64>,
+    /// Goal: coefficients of a block in each channel, as 256,64,64
+    #[arg(long, value_parser = parse_counts, group = "goal")]
+    coefficients: Option<[usize; 3]>,
+    /// What --rmse is an error of
+    #[arg(long, value_enum, default_value = "log")]
+    domain: Domain,
+    /// Cap: operations of a filtered sample that the file may state
+    #[arg(long)]
+    operations: Option<u32>,
+    /// Texels along the side of a block, 1 to 16; chosen among 2, 4 and 8 if not given
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=16))]
+    edge: Option<u16>,
+    /// A trained dictionary; without it the material's own columns
+    #[arg(long)]
+    dictionary: Option<PathBuf>,
+    /// Name the dictionary instead of carrying its columns
+    #[arg(long, requires = "dictionary")]
+    external: bool,
+    /// Train this many dictionaries on the material itself
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=256), conflicts_with = "dictionary")]
+    own_dictionaries: Option<u16>,
+    /// Quality layers, 1 to 8
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=8))]
+    layers: u16,
+    /// Levels of detail, 1 to 15
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=15))]
+    levels: u16,
+    /// Bits of a value in each channel; chosen if not given
+    #[arg(long, value_parser = parse_three::<u32>)]
+    value_bits: Option<[u32; 3]>,
+    /// Domain that is coded
+    #[arg(long, value_enum, default_value = "log")]
+    transfer: Domain,
+    /// Offset of the logarithm; a thousandth of the mean if not given
+    #[arg(long, value_parser = parse_positive)]
+    offset: Option<f64>,
+    /// Tell what was reached, as JSON, to stdout
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    threads: Threads,
+}
+
+#[derive(serde::Serialize)]
+struct EncodeReport {
+    bytes: usize,
+    ratio_to_binary16: f64,
+    edge: usize,
+    operations: u32,
+    coefficients: [usize; 3],
+    predicted_rms: f64,
+    metrics: Metrics,
+}
+
+fn encode(args: EncodeArgs) -> Result<u8> {
+    args.threads.apply();
+    let wish = match (args.rmse, args.psnr, args.size, args.coefficients) {
+        (Some(rms), ..) if args.domain == Domain::Log => Wish::LogRms(rms),
+        (Some(rms), ..) => Wish::LinearRms(rms),
+        (_, Some(db), ..) => Wish::Psnr(db),
+        (_, _, Some(bytes), _) => Wish::Size(bytes),
+        (_, _, _, Some(counts)) => Wish::Coefficients(counts),
+        _ => return Err(ToolError::Usage("a goal is missing: --rmse, --psnr, --size or --coefficients".into())),
+    };
+    if args.value_bits.is_some_and(|bits| bits.iter().any(|b| !(1..=16).contains(b))) {
+        return Err(ToolError::Usage("--value-bits: 1 to 16".into()));
+    }
+    let data = Dataset::open(&args.dataset)?;
+    let statistics = data.statistics();
+    let transfer = match args.transfer {
+        Domain::Log => TransferModel::Log2 { offset: args.offset.map_or(statistics.log_offset(), |offset| offset as f32) },
+        // Values below 16, so that a texture is far below its bound of 32.
+        Domain::Linear => TransferModel::Linear { exponent: (statistics.largest.max(1e-30).log2().ceil() as i32 - 4).clamp(-60, 60) },
+    };
+    let beside = args.output.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let temporary = tempfile::Builder::new().prefix(".selvedge-").tempdir_in(beside).map_err(ToolError::io(beside))?;
+    let coarser = pyramid::levels(&data, args.levels as usize, temporary.path())?;
+    let progress = Progress::new();
+    let levels: Vec<&Dataset> = std::iter::once(&data).chain(&coarser).collect();
+    let prepared = prepare(levels, transfer, &|done, all| progress.tell("means and bases", done, all))?;
+
+    let dictionary = args.dictionary.as_deref().map(|path| dictionary_file::from_bytes(path, files::read(path)?)).transpose()?;
+    if let Some(dictionary) = &dictionary {
+        same_directions(dictionary, data.description())?;
+    }
+    let mut options = Options { layers: args.layers as usize, operations: args.operations, value_bits: args.value_bits, ..Options::default() };
+    options.edge = args.edge.map_or(0, |edge| edge as usize);
+    let mut trained = None;
+    if let Some(count) = args.own_dictionaries {
+        let edge = if options.edge == 0 { 4 } else { options.edge };
+        options.edge = edge;
+        trained = own_dictionaries(&data, count as usize, edge)?;
+    }
+    if let Some(dictionary) = &dictionary {
+        if args.external {
+            options.external = Some(dictionary.bytes.as_slice().into());
+        }
+        // The trained spatial bases are worth more than another edge.
+        if options.edge == 0 {
+            options.edge = dictionary.training.options.edge;
+        }
+    }
+    let ensembles = |edge: usize| -> [Ensemble; 3] {
+        match (&dictionary, &trained) {
+            (Some(dictionary), _) => dictionary.ensembles.each_ref().map(|e| e.with_edge(edge)),
+            (_, Some(trained)) => trained.ensembles.each_ref().map(|e| e.with_edge(edge)),
+            _ => prepared.own_ensembles(edge),
+        }
+    };
+    let verified = encode_verified(&prepared, &ensembles, wish, &options, &|event| match event {
+        Event::Pass(what, done, all) => progress.tell(what, done, all),
+        Event::Attempt(..) => progress.clear(),
+    })?;
+    progress.clear();
+    files::write(&args.output, &verified.encoded.bytes)?;
+    if args.json {
+        let bytes = verified.encoded.bytes.len();
+        print_json(&EncodeReport {
+            bytes,
+            ratio_to_binary16: data.description().half_bytes() as f64 / bytes as f64,
+            edge: verified.edge,
+            operations: verified.operations,
+            coefficients: verified.encoded.coefficients,
+            predicted_rms: verified.encoded.predicted_rms,
+            metrics: verified.metrics,
+        })?;
+    }
+    Ok(0)
+}
+
+/// An ensemble trained on the material that is encoded, at a sparsity near what its blocks will have.
+fn own_dictionaries(data: &Dataset, count: usize, edge: usize) -> Result<Option<train::Trained>> {
+    let texels = edge * edge;
+    let options = train::Options {
+        dictionaries: count,
+        sparsity: [4 * texels, texels.div_ceil(2), texels.div_ceil(2)],
+        edge,
+        blocks: (200_000 / texels).max(64),
+        iterations: 12,
+        ..train::Options::default()
+    };
+    train::train(&[data], &options, None, &mut |_| true)
+}
+
+fn same_directions(dictionary: &dictionary_file::DictionaryFile, description: &Description) -> Result<()> {
+    let near = |a: &[glam::DVec3], b: &[glam::DVec3]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (*a - *b).length() < 2e-4);
+    let training = &dictionary.training;
+    if near(&training.lights, &description.lights) && near(&training.views, &description.views) {
+        return Ok(());
+    }
+    Err(ToolError::Usage("the dictionary was trained for other directions than those of the dataset".into()))
+}
+
+/// A material given by its path: a dataset or a file.
+enum Given {
+    Data(Dataset),
+    File(Vec<u8>, Option<Vec<u8>>),
+}
+
+impl Given {
+    fn open(path: &Path, dictionary: Option<&Path>) -> Result<Given> {
+        if Dataset::is_one(path) {
+            return Ok(Given::Data(Dataset::open(path)?));
+        }
+        Ok(Given::File(files::read(path)?, dictionary.map(files::read).transpose()?))
+    }
+
+    fn opened<'a>(&'a self, path: &Path, limits: &Limits) -> Result<Option<Selvedge<'a>>> {
+        match self {
+            Given::Data(_) => Ok(None),
+            Given::File(bytes, dictionary) => {
+                selvedge::open_with(bytes, dictionary.as_deref(), limits).map(Some).map_err(|finding| ToolError::Invalid { path: path.to_owned(), finding })
+            }
+        }
+    }
+}
+
+/// Metrics that a limit can be of.
+#[derive(Clone, Copy, ValueEnum)]
+enum Limited {
+    LogRms,
+    LinearRms,
+    RelativeL2,
+    Largest,
+}
+
+#[derive(Args)]
+pub struct CompareArgs {
+    /// The reference: a dataset or a file
+    reference: PathBuf,
+    /// What is compared with it: a dataset or a file
+    other: PathBuf,
+    /// External dictionary of the files
+    #[arg(long)]
+    dictionary: Option<PathBuf>,
+    /// What --warn and --fail are limits of
+    #[arg(long, value_enum, default_value = "largest")]
+    by: Limited,
+    /// Warn above
+    #[arg(long, default_value_t = 1e-6)]
+    warn: f64,
+    /// Fail above
+    #[arg(long, default_value_t = 1e-6)]
+    fail: f64,
+    /// Peak of the PSNR; the largest value of the reference if not given
+    #[arg(long, value_parser = parse_positive)]
+    peak: Option<f64>,
+    /// As JSON
+    #[arg(long)]
+    json: bool,
+    /// Write a picture: other, reference and the error in false colour, side by side
+    #[arg(long)]
+    picture: Option<PathBuf>,
+    /// Light of the picture: angle from the normal and azimuth, degrees; the nearest direction of the reference is taken
+    #[arg(long, default_value = "30,0", value_parser = parse_angles, allow_hyphen_values = true)]
+    light: Direction,
+    /// View of the picture
+    #[arg(long, default_value = "0,0", value_parser = parse_angles, allow_hyphen_values = true)]
+    view: Direction,
+    /// Error that is white in the picture, of ln(x + offset)
+    #[arg(long, default_value_t = 1.0, value_parser = parse_positive)]
+    white: f64,
+    /// Factor of the picture's radiance
+    #[arg(long, default_value_t = 1.0, value_parser = parse_positive)]
+    exposure: f64,
+    #[command(flatten)]
+    threads: Threads,
+}
+
+/// The exit code of `compare`, which is that of idiff.
+fn compare_code(result: Result<u8>) -> Result<u8> {
+    match result {
+        Err(ToolError::Different(what)) => {
+            eprintln!("selvedge: {what}");
+            Ok(3)
+        }
+        Err(error @ (ToolError::Io { .. } | ToolError::Foreign { .. } | ToolError::Invalid { .. })) => {
+            eprintln!("selvedge: {error}");
+            Ok(4)
+        }
+        other => other,
+    }
+}
+
+fn compare(args: CompareArgs) -> Result<u8> {
+    args.threads.apply();
+    let limits = Limits::NONE;
+    let [a, b] = [&args.reference, &args.other].map(|path| Given::open(path, args.dictionary.as_deref()));
+    let (a, b) = (a?, b?);
+    let (file_a, file_b) = (a.opened(&args.reference, &limits)?, b.opened(&args.other, &limits)?);
+    fn source<'a>(given: &'a Given, file: &'a Option<Selvedge<'a>>) -> Source<'a> {
+        match (given, file) {
+            (Given::Data(data), _) => Source::Data(data),
+            (_, Some(file)) => Source::File(file, 0),
+            (Given::File(..), None) => unreachable!("a file is opened or refused"),
+        }
+    }
+    let (reference, other) = (source(&a, &file_a), source(&b, &file_b));
+    let (description, offset) = match reference {
+        Source::Data(data) => (data.description().clone(), data.statistics().log_offset()),
+        Source::File(file, _) => (measure::describe(file), measure::log_offset(file)),
+    };
+    let progress = Progress::new();
+    let metrics = measure::compare(reference, other, &description, offset, args.peak, &|done, all| progress.tell("comparing", done, all))?;
+    progress.clear();
+    if args.json {
+        print_json(&metrics)?;
+    } else {
+        print(&text(&metrics))?;
+    }
+    if let Some(path) = &args.picture {
+        let [light, view] = [(&description.lights, args.light), (&description.views, args.view)].map(|(set, asked)| measure::nearest(set, asked));
+        let [a, b] = [reference, other].map(|source| measure::image(source, &description, light, view));
+        picture::beside_error(&b?, &a?, description.size, offset, args.white as f32, args.exposure as f32).save(path)?;
+    }
+    let value = match args.by {
+        Limited::LogRms => metrics.log_rms,
+        Limited::LinearRms => metrics.linear_rms,
+        Limited::RelativeL2 => metrics.relative_l2,
+        Limited::Largest => metrics.largest.difference as f64,
+    };
+    Ok(if value > args.fail || value.is_nan() {
+        2
+    } else if value > args.warn {
+        1
+    } else {
+        0
+    })
+}
+
+fn text(metrics: &Metrics) -> String {
+    let Place { difference, texel, light, view } = metrics.largest;
+    format!(
+        "log RMS     {:.6}  of ln(x + {:e})\nlinear RMS  {:.6}\nrelative L2 {:.6}\nPSNR        {:.2} dB  against {}\nlargest     {difference} at texel ({}, {}), light {light}, view {view}\ndifferent   {} of {}\n",
+        metrics.log_rms,
+        metrics.log_offset,
+        metrics.linear_rms,
+        metrics.relative_l2,
+        metrics.psnr_db,
+        metrics.peak,
+        texel[0],
+        texel[1],
+        metrics.different,
+        metrics.count
+    )
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum KeepArg {
+    Texture,
+    Mean,
+    Nothing,
+}
+
+#[derive(Args)]
+pub struct TrimArgs {
+    #[command(flatten)]
+    source: FileSource,
+    /// The file to write
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Keep this many quality layers
+    #[arg(long)]
+    layers: Option<u32>,
+    /// Keep this many levels of detail, from the finest on
+    #[arg(long)]
+    levels: Option<u32>,
+    /// What to keep of each channel, as texture,mean,mean
+    #[arg(long, value_delimiter = ',', num_args = 3, value_enum)]
+    channels: Option<Vec<KeepArg>>,
+    /// Drop dictionaries, atoms and columns that nothing uses
+    #[arg(long)]
+    unused: bool,
+    /// Keep lights up to this angle from the normal, and if given between two azimuths: 60 or 60,350,10
+    #[arg(long, value_parser = parse_sector)]
+    lights: Option<Sector>,
+    /// Keep views, likewise
+    #[arg(long, value_parser = parse_sector)]
+    views: Option<Sector>,
+}
+
+fn parse_sector(text: &str) -> std::result::Result<Sector, String> {
+    let parts: Option<Vec<f64>> = text.split(',').map(|n| n.trim().parse().ok()).collect();
+    let sector = match parts.as_deref() {
+        Some(&[polar]) => Sector::new(polar, None),
+        Some(&[polar, from, to]) => Sector::new(polar, Some([from, to])),
+        _ => return Err("an angle, or an angle and two azimuths, as 60,350,10".into()),
+    };
+    sector.map_err(|error| error.to_string())
+}
+
+fn warn_of_triangles(path: &Path, file: &Selvedge<'_>) {
+    if !read::same_triangles(file) {
+        eprintln!("warning: {}: its directions are triangulated in another way than this tool does it; decoded bits between them may change", path.display());
+    }
+}
+
+fn trim_file(args: TrimArgs) -> Result<u8> {
+    let model = crate::with_material(&args.source, |file| {
+        warn_of_triangles(&args.source.file, &file);
+        Ok(read::model_of(&file))
+    })?;
+    let keep = |arg: &KeepArg| match arg {
+        KeepArg::Texture => Keep::Texture,
+        KeepArg::Mean => Keep::Mean,
+        KeepArg::Nothing => Keep::Nothing,
+    };
+    let channels = args.channels.as_ref().map_or(Trim::default().channels, |list| std::array::from_fn(|c| keep(&list[c])));
+    let options = Trim { layers: args.layers, levels: args.levels, channels, unused: args.unused, lights: args.lights, views: args.views };
+    let trimmed = trim(&model, &options)?;
+    files::write(&args.output, &write::write_material(&trimmed))?;
+    Ok(0)
+}
+
+#[derive(Args)]
+pub struct BlendArgs {
+    /// The material at 0
+    a: PathBuf,
+    /// The material at 1
+    b: PathBuf,
+    /// The file to write
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Where between them, 0 to 1
+    #[arg(long, default_value_t = 0.5)]
+    alpha: f64,
+    /// External dictionary of both
+    #[arg(long)]
+    dictionary: Option<PathBuf>,
+    /// Put both side by side instead of changing a basis: nothing is lost, a sample costs both
+    #[arg(long)]
+    exact: bool,
+    /// Most coefficients of a block; those of both together if not given
+    #[arg(long)]
+    most: Option<u32>,
+    /// Blend textures under scales that differ
+    #[arg(long)]
+    scales_apart: bool,
+}
+
+fn blend_files(args: BlendArgs) -> Result<u8> {
+    let dictionary = args.dictionary.as_deref().map(files::read).transpose()?;
+    let open = |path: &Path| -> Result<_> {
+        let bytes = files::read(path)?;
+        let file = selvedge::open_with(&bytes, dictionary.as_deref(), &Limits::NONE);
+        let file = file.map_err(|finding| ToolError::Invalid { path: path.to_owned(), finding })?;
+        warn_of_triangles(path, &file);
+        Ok(read::model_of(&file))
+    };
+    let options = Blend { exact: args.exact, most: args.most, scales_apart: args.scales_apart, ..Blend::default() };
+    let (model, report) = blend(&open(&args.a)?, &open(&args.b)?, args.alpha, options)?;
+    if report.outside > 0.0 && report.energy > 0.0 {
+        eprintln!("{:.4} % of the energy was outside of the span of the dictionaries", 100.0 * report.outside / report.energy);
+    }
+    files::write(&args.output, &write::write_material(&model))?;
+    Ok(0)
+}
+
+/// Runs a command.
+pub fn run(command: Material) -> Result<u8> {
+    match command {
+        Material::Synth(args) => synthesise(args),
+        Material::Export(args) => export(args),
+        Material::Train(args) => train_dictionary(args),
+        Material::Encode(args) => encode(*args),
+        Material::Compare(args) => compare_code(compare(args)),
+        Material::Trim(args) => trim_file(args),
+        Material::Blend(args) => blend_files(args),
+    }
+}
