@@ -3,6 +3,7 @@
 //! | module | does |
 //! |---|---|
 //! | [`sparsebtf`] | reads the files of SparseBTF 2023 |
+//! | [`folder`] | a folder of images becomes a dataset, and back |
 //! | [`model`], [`write`](mod@write), [`triangulate`] | a quantised material in memory, and its bytes |
 //! | [`quantise`] | coefficients become integers |
 //! | [`read`], [`trim`](mod@trim), [`sector`] | a file becomes a model again, and a smaller one |
@@ -25,6 +26,7 @@ pub mod error;
 pub mod example;
 pub mod extreme;
 pub mod files;
+pub mod folder;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod inspect;
