@@ -11,8 +11,10 @@
 //! | [`inspect`], [`picture`], [`demo`] | what `info`, `validate`, `decode` and `demo` show |
 //! | [`kernel`], [`gpu`] | the kernel for other renderers, and run here |
 //! | [`example`], [`extreme`], [`random`] | files that the specification and the tests use |
+//! | [`baseline`] | what the encoder is measured against |
 //! | [`files`], [`error`] | whole writes, exit codes |
 
+pub mod baseline;
 pub mod basis;
 pub mod blend;
 pub mod blocks;

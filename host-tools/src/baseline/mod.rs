@@ -1,0 +1,82 @@
+//! What the encoder is measured against: two older ways to store the same data, in honest floats.
+//!
+//! [`pca`] is a truncated singular value decomposition of the logarithms, quantised to 8 or 16 bits. [`published`] is the
+//! layout of SparseBTF (Kavoosighafi et al. 2023, sections 3.1 to 3.4). Both are decoded from what they would store, and
+//! compared by the metrics of [`crate::measure`]: root mean squared errors of linear radiance and of `ln(x + e)` over all
+//! values, where `e` is the dataset's [`log_offset`](crate::dataset::Statistics::log_offset). Neither writes a file.
+
+pub mod pca;
+pub mod published;
+
+use crate::transfer::log2;
+use serde::Serialize;
+use std::f64::consts::LN_2;
+
+/// What a baseline costs and how far it is from the data.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Row {
+    /// Bytes that it would store.
+    pub bytes: u64,
+    /// Root mean squared error of `ln(x + e)`.
+    pub log_rms: f64,
+    /// Root mean squared error of linear radiance.
+    pub linear_rms: f64,
+}
+
+/// Sums of squared errors of one part.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    count: u64,
+    log: f64,
+    linear: f64,
+}
+
+impl Sums {
+    /// One value of the data and the one decoded for it.
+    #[inline(always)]
+    fn compare(&mut self, wanted: f32, decoded: f32, log_offset: f32) {
+        self.count += 1;
+        self.log += (log2(decoded + log_offset) as f64 - log2(wanted + log_offset) as f64).powi(2);
+        self.linear += (decoded as f64 - wanted as f64).powi(2);
+    }
+
+    fn add(&mut self, other: Sums) {
+        self.count += other.count;
+        self.log += other.log;
+        self.linear += other.linear;
+    }
+
+    fn row(&self, bytes: u64) -> Row {
+        let count = self.count as f64;
+        Row { bytes, log_rms: LN_2 * (self.log / count).sqrt(), linear_rms: (self.linear / count).sqrt() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::dataset::{Dataset, Description, Sample, Writer};
+    use crate::directions;
+    use crate::random::Random;
+    use std::path::Path;
+
+    /// A dataset of three products of a texel's and a pair's factor, and a little noise.
+    pub fn small(folder: &Path, size: [usize; 2]) -> Dataset {
+        let lights = directions::grid(81).expect("known")[..9].to_vec();
+        let path = folder.join("a.selvset");
+        let description = Description { size, views: lights[..6].to_vec(), lights, sample: Sample::Float, ..Description::default() };
+        let writer = Writer::create(&path, description).expect("created");
+        let mut random = Random::new(7);
+        let pairs = writer.description().pairs();
+        for texel in 0..size[0] * size[1] {
+            let wave = |i: usize, k: usize| ((i * (k + 2)) as f32 * 0.37).sin();
+            let value = |i: usize| {
+                let log = (0..3).map(|k| wave(texel, k) * wave(i / 3, k + 3)).sum::<f32>() + wave(i, 1) * 0.2;
+                log.exp() + random.range(0, 1000) as f32 / 1e5
+            };
+            let values: Vec<f32> = (0..pairs * 3).map(value).collect();
+            writer.put(texel, 0, &values).expect("put");
+        }
+        writer.finish().expect("finished");
+        Dataset::open(&path).expect("opened")
+    }
+}

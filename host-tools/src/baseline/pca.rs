@@ -1,0 +1,282 @@
+//! Principal components of the logarithms: one matrix, a row for each texel and a column for each pair and colour.
+//!
+//! The matrix holds `ln(x + e)` less its mean row (the mean ABRDF). Its leading singular vectors are found by block power
+//! iteration with a random start (Halko, Martinsson, Tropp 2011, algorithm 4.4); each iteration is one pass over the data,
+//! so that the matrix is never held. Both factors and the mean are quantised to 8 or 16 bits, a scale for each component
+//! and factor, and everything is counted. Singular values are in the factor over texels.
+
+use super::{Row, Sums};
+use crate::dataset::Dataset;
+use crate::error::Result;
+use crate::linear::{eigenbasis, ordered, product, product_at, product_bt};
+use crate::random::Random;
+use crate::transfer::log2;
+use std::collections::BTreeMap;
+use std::f32::consts::LN_2;
+
+/// Iterations, each of which squares the separation of the singular values.
+const PASSES: usize = 5;
+/// Directions beyond the wished rank, as a part of it, and at least.
+const OVERSAMPLING: (usize, usize) = (4, 8);
+/// Texels of a part of a pass.
+const BATCH: usize = 128;
+/// Widths that a factor can have, in bits.
+pub const WIDTHS: [u32; 2] = [8, 16];
+
+/// The components of a dataset, and what was measured of them so far.
+pub struct Pca<'a> {
+    dataset: &'a Dataset,
+    mean: Vec<f32>,
+    /// `[texel][component]`.
+    of_texels: Vec<f32>,
+    /// `[pair and colour][component]`.
+    of_pairs: Vec<f32>,
+    rank: usize,
+    /// Square of each singular value.
+    energies: Vec<f64>,
+    /// Sum of all squares of the matrix.
+    energy: f64,
+    measured: BTreeMap<(usize, u32), Row>,
+}
+
+/// A rank and a width that were chosen, and what they reach.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Choice {
+    /// Components.
+    pub rank: usize,
+    /// Bits of a number.
+    pub bits: u32,
+    /// Cost and errors.
+    pub row: Row,
+}
+
+/// Work on the linear values of batches of texels, results in the order of the texels.
+fn pass<T: Send, A>(dataset: &Dataset, work: impl Fn(usize, &[f32]) -> T + Sync, total: A, mut fold: impl FnMut(&mut A, T)) -> Result<A> {
+    let (texels, columns) = (dataset.description().texels(), dataset.description().texel_len());
+    let part = |i: usize| -> Result<T> {
+        let count = BATCH.min(texels - i * BATCH);
+        let mut values = vec![0.0; count * columns];
+        dataset.read(i * BATCH, count, &mut Vec::new(), &mut values)?;
+        Ok(work(i * BATCH, &values))
+    };
+    ordered(texels.div_ceil(BATCH), part, total, |total, _, result| fold(total, result))
+}
+
+/// Orthonormal columns with the span of a tall matrix, both row-major.
+fn orthonormal(matrix: &[f64], columns: usize) -> Vec<f32> {
+    let q = faer::Mat::from_fn(matrix.len() / columns, columns, |r, c| matrix[r * columns + c]).qr().compute_thin_Q();
+    (0..matrix.len()).map(|i| q[(i / columns, i % columns)] as f32).collect()
+}
+
+/// The leading `max_rank` components of a dataset.
+///
+/// # Errors
+/// If the data cannot be read.
+pub fn pca(dataset: &Dataset, max_rank: usize) -> Result<Pca<'_>> {
+    let (texels, columns) = (dataset.description().texels(), dataset.description().texel_len());
+    let offset = dataset.statistics().log_offset();
+    let ln = |x: f32| LN_2 * log2(x + offset);
+    let sums = |_: usize, values: &[f32]| {
+        let mut sum = vec![0.0f64; columns];
+        values.chunks(columns).for_each(|texel| sum.iter_mut().zip(texel).for_each(|(sum, &x)| *sum += ln(x) as f64));
+        sum
+    };
+    let add = |total: &mut Vec<f64>, sum: Vec<f64>| total.iter_mut().zip(sum).for_each(|(total, sum)| *total += sum);
+    let sum = pass(dataset, sums, vec![0.0; columns], add)?;
+    let mean: Vec<f32> = sum.iter().map(|sum| (sum / texels as f64) as f32).collect();
+
+    let most = texels.min(columns);
+    let rank = max_rank.clamp(1, most);
+    let wide = (rank + (rank / OVERSAMPLING.0).max(OVERSAMPLING.1)).min(most);
+    let mut random = Random::new(1);
+    let start: Vec<f64> = (0..columns * wide).map(|_| random.range(-1_000_000, 1_000_000) as f64).collect();
+    let mut q = orthonormal(&start, wide);
+    let centred = |values: &[f32]| -> Vec<f32> { values.chunks(columns).flat_map(|texel| texel.iter().zip(&mean).map(|(&x, mean)| ln(x) - mean)).collect() };
+    for _ in 0..PASSES {
+        let work = |_: usize, values: &[f32]| {
+            let matrix = centred(values);
+            let count = matrix.len() / columns;
+            let mut projected = vec![0.0; count * wide];
+            product(&mut projected, &matrix, &q, [count, columns, wide], false);
+            let mut back = vec![0.0; columns * wide];
+            product_at(&mut back, &matrix, &projected, [columns, count, wide], false);
+            back
+        };
+        let add = |total: &mut Vec<f64>, part: Vec<f32>| total.iter_mut().zip(part).for_each(|(total, part)| *total += part as f64);
+        q = orthonormal(&pass(dataset, work, vec![0.0; columns * wide], add)?, wide);
+    }
+    // In the subspace the singular vectors are those of a small matrix.
+    let work = |_: usize, values: &[f32]| {
+        let matrix = centred(values);
+        let count = matrix.len() / columns;
+        let mut projected = vec![0.0; count * wide];
+        product(&mut projected, &matrix, &q, [count, columns, wide], false);
+        let mut gram = vec![0.0; wide * wide];
+        product_at(&mut gram, &projected, &projected, [wide, count, wide], false);
+        (projected, gram, matrix.iter().map(|&v| (v as f64).powi(2)).sum::<f64>())
+    };
+    let start = (Vec::new(), vec![0.0; wide * wide], 0.0);
+    let (projected, gram, energy) = pass(dataset, work, start, |(all, gram, energy), (projected, part, of_part): (Vec<f32>, Vec<f32>, f64)| {
+        all.extend(projected);
+        gram.iter_mut().zip(part).for_each(|(total, part): (&mut f64, f32)| *total += part as f64);
+        *energy += of_part;
+    })?;
+    let (turn, energies) = eigenbasis(&gram, wide);
+    let turn = turn.first(rank);
+    let mut of_texels = vec![0.0; texels * rank];
+    product(&mut of_texels, &projected, &turn.entries, [texels, wide, rank], false);
+    let mut of_pairs = vec![0.0; columns * rank];
+    product(&mut of_pairs, &q, &turn.entries, [columns, wide, rank], false);
+    Ok(Pca { dataset, mean, of_texels, of_pairs, rank, energies, energy, measured: BTreeMap::new() })
+}
+
+/// The first `rank` of `all` columns, each quantised to its largest magnitude and decoded again.
+fn quantised(factor: &[f32], all: usize, rank: usize, bits: u32) -> Vec<f32> {
+    let most = ((1u32 << (bits - 1)) - 1) as f32;
+    let mut largest = vec![0.0f32; rank];
+    for row in factor.chunks(all) {
+        largest.iter_mut().zip(row).for_each(|(largest, v)| *largest = largest.max(v.abs()));
+    }
+    let scales: Vec<f32> = largest.iter().map(|largest| largest.max(1e-30) / most).collect();
+    factor.chunks(all).flat_map(|row| row.iter().zip(&scales).map(|(v, scale)| (v / scale).round() * scale)).collect()
+}
+
+impl Pca<'_> {
+    /// Components that were found.
+    pub fn rank(&self) -> usize {
+        self.rank
+    }
+
+    /// Bytes at a rank and width: the mean with its base and scale, both factors, and two scales a component.
+    pub fn bytes(&self, rank: usize, bits: u32) -> u64 {
+        let (texels, columns) = (self.dataset.description().texels() as u64, self.mean.len() as u64);
+        let width = bits as u64 / 8;
+        columns * width + 8 + rank as u64 * ((texels + columns) * width + 8)
+    }
+
+    /// Error of the logarithms at a rank, without quantisation.
+    pub fn predicted_rms(&self, rank: usize) -> f64 {
+        let left = self.energy - self.energies[..rank].iter().sum::<f64>();
+        (left.max(0.0) / (self.dataset.description().texels() * self.mean.len()) as f64).sqrt()
+    }
+
+    /// Errors over all values, decoded from quantised factors and mean.
+    ///
+    /// # Errors
+    /// If the data cannot be read.
+    pub fn measure(&mut self, rank: usize, bits: u32) -> Result<Row> {
+        let rank = rank.min(self.rank);
+        if let Some(row) = self.measured.get(&(rank, bits)) {
+            return Ok(*row);
+        }
+        let offset = self.dataset.statistics().log_offset();
+        let columns = self.mean.len();
+        let of_texels = quantised(&self.of_texels, self.rank, rank, bits);
+        let of_pairs = quantised(&self.of_pairs, self.rank, rank, bits);
+        let least = self.mean.iter().copied().fold(f32::MAX, f32::min);
+        let largest = self.mean.iter().copied().fold(f32::MIN, f32::max);
+        let scale = (largest - least).max(1e-30) / ((1u32 << bits) - 1) as f32;
+        let mean: Vec<f32> = self.mean.iter().map(|m| least + ((m - least) / scale).round() * scale).collect();
+        let work = |first: usize, values: &[f32]| {
+            let count = values.len() / columns;
+            let mut logs: Vec<f32> = mean.iter().copied().cycle().take(values.len()).collect();
+            if rank > 0 {
+                product_bt(&mut logs, &of_texels[first * rank..][..count * rank], &of_pairs, [count, rank, columns], true);
+            }
+            let mut sums = Sums::default();
+            values.iter().zip(logs).for_each(|(&wanted, log)| sums.compare(wanted, (log.exp() - offset).max(0.0), offset));
+            sums
+        };
+        let sums = pass(self.dataset, work, Sums::default(), |total, sums| total.add(sums))?;
+        let row = sums.row(self.bytes(rank, bits));
+        self.measured.insert((rank, bits), row);
+        Ok(row)
+    }
+
+    /// The better of both widths within a budget, or `None` if not even the mean fits.
+    ///
+    /// # Errors
+    /// If the data cannot be read.
+    pub fn best_at(&mut self, bytes: u64) -> Result<Option<Choice>> {
+        let mut best: Option<Choice> = None;
+        for bits in WIDTHS {
+            let base = self.bytes(0, bits);
+            if base <= bytes {
+                let rank = (((bytes - base) / (self.bytes(1, bits) - base)) as usize).min(self.rank);
+                let row = self.measure(rank, bits)?;
+                if best.is_none_or(|best| row.log_rms < best.row.log_rms) {
+                    best = Some(Choice { rank, bits, row });
+                }
+            }
+        }
+        Ok(best)
+    }
+
+    /// The fewest bytes that reach an error of the logarithms, or `None` if all components found do not.
+    ///
+    /// # Errors
+    /// If the data cannot be read.
+    pub fn reach(&mut self, log_rms: f64) -> Result<Option<Choice>> {
+        let mut best: Option<Choice> = None;
+        for bits in WIDTHS {
+            // A wider one is of use only if it needs fewer bytes.
+            let most = (0..=self.rank).rev().find(|&rank| best.is_none_or(|best| self.bytes(rank, bits) < best.row.bytes));
+            let Some(most) = most else { continue };
+            if let Some(rank) = self.least_rank(bits, log_rms, most)? {
+                best = Some(Choice { rank, bits, row: self.measure(rank, bits)? });
+            }
+        }
+        Ok(best)
+    }
+
+    /// The least rank up to `most` that reaches an error; errors fall with rank.
+    fn least_rank(&mut self, bits: u32, log_rms: f64, most: usize) -> Result<Option<usize>> {
+        let mut high = (0..most).find(|&rank| self.predicted_rms(rank) <= log_rms).unwrap_or(most);
+        let mut step = 1;
+        let mut low = high;
+        while self.measure(high, bits)?.log_rms > log_rms {
+            if high == most {
+                return Ok(None);
+            }
+            (low, high, step) = (high, (high + step).min(most), step * 2);
+        }
+        step = 1;
+        while low > 0 && self.measure(low, bits)?.log_rms <= log_rms {
+            (high, low, step) = (low, low.saturating_sub(step), step * 2);
+        }
+        // The least that reaches is above `low`, or is 0.
+        if self.measure(low, bits)?.log_rms <= log_rms {
+            return Ok(Some(low));
+        }
+        while high - low > 1 {
+            let middle = (low + high) / 2;
+            if self.measure(middle, bits)?.log_rms <= log_rms { high = middle } else { low = middle }
+        }
+        Ok(Some(high))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::baseline::tests::small;
+
+    #[test]
+    fn components_explain_what_they_should_at_the_stated_bytes() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let dataset = small(folder.path(), [21, 12]);
+        let mut pca = pca(&dataset, 12).expect("made");
+        let errors: Vec<f64> = [0, 1, 2, 3].map(|rank| pca.measure(rank, 16).expect("measured").log_rms).to_vec();
+        assert!(errors.windows(2).all(|pair| pair[1] < pair[0] * 0.95), "{errors:?}");
+        assert!(errors[3] < 0.05 * errors[0], "{errors:?}");
+        (0..4).for_each(|rank| assert!((errors[rank] - pca.predicted_rms(rank)).abs() < 1e-3, "{errors:?}"));
+        assert_eq!(pca.bytes(2, 8), 162 + 8 + 2 * (162 + 252 + 8));
+        assert_eq!(pca.bytes(1, 16), 2 * 162 + 8 + 2 * (162 + 252) + 8);
+        let best = pca.best_at(2000).expect("measured").expect("fits");
+        assert!(best.row.bytes <= 2000 && best.rank > 0);
+        assert!(pca.best_at(100).expect("measured").is_none());
+        let reached = pca.reach(errors[2]).expect("measured").expect("reached");
+        assert!(reached.row.log_rms <= errors[2] && reached.row.bytes <= pca.bytes(2, 16));
+        assert!(pca.reach(1e-9).expect("measured").is_none());
+    }
+}
