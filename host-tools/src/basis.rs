@@ -53,9 +53,48 @@ fn columns_of(factor: &FactorModel) -> Vec<Vec<f64>> {
     (0..count).map(|column| factor.entries.iter().skip(column).step_by(count).map(|&entry| entry as f64 / 32_768.0).collect()).collect()
 }
 
+/// `M b` as a tensor `[y][x][view][light]`, for a product of matrices by mode with `from` columns and `to` rows.
+fn apply(matrices: &[Matrix; 4], record: &Sparse, from: [usize; 4], to: [usize; 4]) -> Vec<f64> {
+    let mut sizes = from;
+    let mut tensor = vec![0.0; sizes.iter().product()];
+    for (atom, value) in record {
+        let [l, v, x, y] = modes(atom);
+        tensor[((y * sizes[2] + x) * sizes[1] + v) * sizes[0] + l] += value;
+    }
+    for (mode, matrix) in matrices.iter().enumerate() {
+        let inner: usize = sizes[..mode].iter().product();
+        let outer: usize = sizes[mode + 1..].iter().product();
+        let mut next = vec![0.0; inner * to[mode] * outer];
+        for block in 0..outer {
+            let (source, target) = (&tensor[block * sizes[mode] * inner..], &mut next[block * to[mode] * inner..][..to[mode] * inner]);
+            for column in 0..sizes[mode] {
+                let source = &source[column * inner..][..inner];
+                if source.iter().all(|&s| s == 0.0) {
+                    continue;
+                }
+                for (row, target) in target.chunks_mut(inner).enumerate() {
+                    let factor = matrix.at(row, column);
+                    target.iter_mut().zip(source).for_each(|(t, s)| *t += factor * s);
+                }
+            }
+        }
+        tensor = next;
+        sizes[mode] = to[mode];
+    }
+    tensor
+}
+
 /// `a^T M b` for a product of matrices by mode.
 fn form(matrices: &[Matrix; 4], a: &Sparse, b: &Sparse) -> f64 {
     let [light, view, x, y] = matrices;
+    // Coefficient by coefficient for short records; long ones as tensors, a mode at a time.
+    let from = matrices.each_ref().map(|m| m.columns);
+    let to = matrices.each_ref().map(|m| m.entries.len() / m.columns.max(1));
+    let dense = from.iter().product::<usize>() * to[0] + to[0] * from[1] * from[2] * from[3] * (to[1] + to[2] + to[3]);
+    if a.len() * b.len() > dense {
+        let applied = apply(matrices, b, from, to);
+        return a.iter().map(|(p, c)| c * applied[((p.y as usize * to[2] + p.x as usize) * to[1] + p.view as usize) * to[0] + p.light as usize]).sum();
+    }
     let of = |p: &AtomModel| {
         let [pl, pv, px, py] = modes(p);
         let (rl, rv, rx, ry) = (light.row(pl), view.row(pv), x.row(px), y.row(py));

@@ -87,6 +87,9 @@ pub struct Moments {
     pub views: [Vec<f64>; 3],
 }
 
+/// Of a run of texels: sums for each pair, and second moments between lights and between views.
+type Sums = ([Vec<f64>; 3], [Vec<f32>; 3], [Vec<f32>; 3]);
+
 /// Means and second moments of a whole dataset in one pass.
 pub fn moments(dataset: &Dataset, forward: Forward, progress: &dyn Fn(usize, usize)) -> Result<Moments> {
     let description = dataset.description();
@@ -96,7 +99,7 @@ pub fn moments(dataset: &Dataset, forward: Forward, progress: &dyn Fn(usize, usi
     let middle = forward.channels(dataset.statistics().mean.map(|m| m as f32));
     let constant = middle.map(|m| vec![m; pairs]);
     // Runs of texels are blocks of one row, whatever the image's shape.
-    let part = |i: usize| -> Result<([Vec<f64>; 3], [Vec<f32>; 3], [Vec<f32>; 3])> {
+    let part = |i: usize| -> Result<Sums> {
         let count = batch.min(texels - i * batch);
         let mut values = vec![0.0; count * pairs * 3];
         dataset.read(i * batch, count, &mut Vec::new(), &mut values)?;
@@ -137,7 +140,7 @@ pub fn moments(dataset: &Dataset, forward: Forward, progress: &dyn Fn(usize, usi
         progress(i + 1, parts);
     })?;
     let count = texels as f64;
-    for c in 0..3 {
+    for (c, middle) in middle.into_iter().enumerate() {
         let mean: Vec<f64> = total.means[c].iter().map(|sum| sum / count).collect();
         let at = |v: usize, l: usize| mean[v * lights + l];
         for (a, b) in (0..lights).flat_map(|a| (0..lights).map(move |b| (a, b))) {
@@ -146,7 +149,7 @@ pub fn moments(dataset: &Dataset, forward: Forward, progress: &dyn Fn(usize, usi
         for (a, b) in (0..views).flat_map(|a| (0..views).map(move |b| (a, b))) {
             total.views[c][a * views + b] -= count * (0..lights).map(|l| at(a, l) * at(b, l)).sum::<f64>();
         }
-        total.means[c] = mean.iter().map(|m| m + middle[c] as f64).collect();
+        total.means[c] = mean.iter().map(|m| m + middle as f64).collect();
     }
     Ok(total)
 }

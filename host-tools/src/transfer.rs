@@ -30,7 +30,7 @@ pub fn log2(x: f32) -> f32 {
     // log2(m) = 2 / ln 2 * artanh((m - 1) / (m + 1)), and the quotient is below 0.172.
     let s = (m - 1.0) / (m + 1.0);
     let s2 = s * s;
-    let series = 2.885_390_1 + s2 * (0.961_796_7 + s2 * (0.577_078 + s2 * (0.412_198_6 + s2 * 0.320_598_9)));
+    let series = 2.885_39 + s2 * (0.961_796_7 + s2 * (0.577_078 + s2 * (0.412_198_6 + s2 * 0.320_598_9)));
     exponent as f32 + s * series
 }
 

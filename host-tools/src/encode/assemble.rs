@@ -150,9 +150,9 @@ fn channel(setting: &Setting<'_>, ensemble: &Ensemble, candidates: &[&Candidates
         let candidates = candidates[level];
         selection.kept[level].iter().enumerate().flat_map(move |(block, list)| list.iter().map(move |&i| (candidates.dictionaries[block] as usize, i as usize)))
     };
-    for level in 0..candidates.len() {
+    for (level, candidates) in candidates.iter().enumerate() {
         for (k, i) in each(level) {
-            for (flags, column) in used[k].iter_mut().zip(split(candidates[level].places[i])) {
+            for (flags, column) in used[k].iter_mut().zip(split(candidates.places[i])) {
                 flags[column] = true;
             }
         }
