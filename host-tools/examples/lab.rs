@@ -74,7 +74,7 @@ fn main() {
                     use std::collections::BTreeMap;
                     let mut kinds: BTreeMap<u32, usize> = BTreeMap::new();
                     for s in file.sections() {
-                        *kinds.entry(s.kind as u32).or_default() += s.length as usize;
+                        *kinds.entry(s.kind).or_default() += s.length as usize;
                     }
                     println!("   {kinds:x?}");
                 }

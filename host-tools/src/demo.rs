@@ -1,10 +1,11 @@
-//! The whole story on the excerpt in the repository: import, validate, decode on CPU and GPU, compare
-//! every word, measure against the authors' values, and show it.
+//! The whole story: modelled materials are rendered, trained on and encoded ([`crate::story`]), measured ones imported
+//! from the excerpt in the repository; all files are validated, decoded on CPU and GPU and compared word for word,
+//! measured against their data, and shown.
 
 use crate::error::{Result, ToolError};
 use crate::picture::{Picture, false_colour};
 use crate::sparsebtf::{AuthorsMaterial, read_material};
-use crate::{files, inspect, write};
+use crate::{files, inspect, story, write};
 use selvedge::batch::FilteredQuery;
 use selvedge::{Direction, Limits, Rgb, Selvedge};
 use std::f64::consts::LN_2;
@@ -201,6 +202,7 @@ pub fn run(out: &Path, say: &mut dyn FnMut(String)) -> Result<()> {
     for (name, bytes) in EXCERPT {
         files::write(&excerpt.join(name), bytes)?;
     }
+    let story = story::tell(out, say)?;
     let mut authors = Vec::new();
     let mut written = Vec::new();
     for name in ["carpet07", "felt05"] {
@@ -219,6 +221,8 @@ pub fn run(out: &Path, say: &mut dyn FnMut(String)) -> Result<()> {
         authors.push(material);
         written.push((path, bytes));
     }
+    let imported = written.len();
+    written.extend(story.written);
     let mut materials = Vec::new();
     for (path, bytes) in &written {
         let report = inspect::validate(&path.display().to_string(), bytes, None, &Limits::default());
@@ -231,7 +235,7 @@ pub fn run(out: &Path, say: &mut dyn FnMut(String)) -> Result<()> {
     let mut rows = String::new();
     let mut balls = Vec::new();
     let pairs: Vec<[usize; 2]> = (0..12).map(|i| [(i * 37 + 5) % 151, (i * 61 + 9) % 151]).collect();
-    for (authors, material) in authors.iter().zip(&materials) {
+    for (authors, material) in authors.iter().zip(&materials[..imported]) {
         for (channel, letter) in [(1, "U"), (2, "V")] {
             let error = channel_error(authors, material, channel, &pairs);
             say(format!(
@@ -258,14 +262,14 @@ pub fn run(out: &Path, say: &mut dyn FnMut(String)) -> Result<()> {
         channel_tiles(authors, material, 2, 20, 0).save(&out.join(format!("{}-V.png", authors.name)))?;
     }
     Picture::beside(&balls, 12).save(&out.join("balls.png"))?;
-    files::write(&out.join("index.html"), page(&materials, &rows, &gpu_line).as_bytes())?;
+    files::write(&out.join("index.html"), page(&materials, imported, &story.html, &rows, &gpu_line).as_bytes())?;
     say(format!("page: {}", out.join("index.html").display()));
     Ok(())
 }
 
-fn page(materials: &[Selvedge<'_>], rows: &str, gpu_line: &str) -> String {
+fn page(materials: &[Selvedge<'_>], imported: usize, story: &str, rows: &str, gpu_line: &str) -> String {
     let facts: String = materials.iter().map(|material| format!("<pre>{}</pre>", inspect::info_text(&inspect::info(material)))).collect();
-    let tiles: String = materials
+    let tiles: String = materials[..imported]
         .iter()
         .map(|material| {
             let name = material.metadata().name;
@@ -276,7 +280,7 @@ fn page(materials: &[Selvedge<'_>], rows: &str, gpu_line: &str) -> String {
         "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>Selvedge demo</title>\
 <style>body{{font:16px/1.5 sans-serif;max-width:60em;margin:2em auto;padding:0 1em}}img{{max-width:100%;image-rendering:pixelated}}\
 pre{{overflow:auto;background:#f4f4f4;padding:1em}}td,th{{padding:.2em 1em;text-align:right}}</style>\
-<h1>Selvedge demo</h1><p>Measured chroma of two materials (SparseBTF 2023, from UBO2014), imported without encoding anew. Luminance is the spatial \
+<h1>Selvedge demo</h1>{story}<h2>Measured materials</h2><p>Measured chroma of two materials (SparseBTF 2023, from UBO2014), imported without encoding anew. Luminance is the spatial \
 average for each pair of directions, since its texture is not among the data.</p><p><img src=\"balls.png\" alt=\"two balls\"></p>\
 <h2>CPU and GPU</h2><p>{gpu_line}.</p><h2>Error against the authors' values</h2><p>Of the natural logarithm, over 12 pairs of directions. Texture part: signal over error after the mean of each image is taken out of both. Whole error: the same signal over all of the error.</p>\
 <table><tr><th>material</th><th>channel</th><th>texture part, dB</th><th>whole error, dB</th><th>largest, ln</th></tr>{rows}</table>\

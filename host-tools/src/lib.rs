@@ -44,6 +44,7 @@ pub mod random;
 pub mod read;
 pub mod sector;
 pub mod sparsebtf;
+pub mod story;
 pub mod synth;
 pub mod train;
 pub mod transfer;
