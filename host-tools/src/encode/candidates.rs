@@ -61,6 +61,10 @@ pub fn magnitude_of_rank(numbers: &[f32], count: usize, buckets: &mut Vec<u32>) 
     let (mut seen, mut energy, mut bucket) = (0, 0.0, BUCKETS);
     while bucket > 0 && seen < count {
         bucket -= 1;
+        // Empty ones too are skipped because the highest stand for what is no number.
+        if buckets[bucket] == 0 {
+            continue;
+        }
         seen += buckets[bucket] as usize;
         let middle = f32::from_bits((bucket as u32) << 16 | 0x8000) as f64;
         energy += buckets[bucket] as f64 * middle * middle;
@@ -148,4 +152,27 @@ fn share(dictionary: usize, tensor: &[f32], threshold: f32, keep: Keep, channel:
     }
     let (places, values) = list.into_iter().unzip();
     Share { dictionary: dictionary as u16, places, values, energy }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    #[test]
+    fn ranks_and_gains_agree_with_sorting() {
+        let mut random = Random::new(4);
+        let numbers: Vec<f32> = (0..5000).map(|_| (random.range(-1000, 1000) as f32 / 100.0).powi(3)).collect();
+        let mut sorted: Vec<f32> = numbers.iter().map(|v| v.abs()).collect();
+        sorted.sort_by(|a, b| b.total_cmp(a));
+        for count in [1, 7, 100, 5000, 9000] {
+            let (magnitude, energy) = magnitude_of_rank(&numbers, count, &mut Vec::new());
+            let exact = sorted[count.min(sorted.len()) - 1];
+            assert!(magnitude <= exact && magnitude >= exact * 0.99 - 1e-30, "{count}: {magnitude} {exact}");
+            let above: f64 = sorted.iter().filter(|&&v| v >= magnitude).map(|&v| (v as f64).powi(2)).sum();
+            assert!((energy - above).abs() < 0.01 * above, "{count}: {energy} {above}");
+        }
+        let exact: f64 = numbers.iter().map(|&v| (v as f64 * v as f64 - 9.0).max(0.0)).sum();
+        assert!((gain_above(&numbers, 3.0) - exact).abs() < 1e-4 * exact);
+    }
 }
