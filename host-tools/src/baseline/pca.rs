@@ -11,6 +11,7 @@ use crate::error::Result;
 use crate::linear::{eigenbasis, ordered, product, product_at, product_bt};
 use crate::random::Random;
 use crate::transfer::log2;
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::f32::consts::LN_2;
 
@@ -19,7 +20,7 @@ const PASSES: usize = 5;
 /// Directions beyond the wished rank, as a part of it, and at least.
 const OVERSAMPLING: (usize, usize) = (4, 8);
 /// Texels of a part of a pass.
-const BATCH: usize = 128;
+const BATCH: usize = 64;
 /// Widths that a factor can have, in bits.
 pub const WIDTHS: [u32; 2] = [8, 16];
 
@@ -50,14 +51,22 @@ pub struct Choice {
     pub row: Row,
 }
 
+thread_local! {
+    /// Bytes and values of a batch, and decoded logarithms: mapping fresh memory for each would take longer than the work.
+    static BUFFERS: RefCell<(Vec<u8>, Vec<f32>)> = const { RefCell::new((Vec::new(), Vec::new())) };
+    static LOGS: RefCell<Vec<f32>> = const { RefCell::new(Vec::new()) };
+}
+
 /// Work on the linear values of batches of texels, results in the order of the texels.
 fn pass<T: Send, A>(dataset: &Dataset, work: impl Fn(usize, &[f32]) -> T + Sync, total: A, mut fold: impl FnMut(&mut A, T)) -> Result<A> {
     let (texels, columns) = (dataset.description().texels(), dataset.description().texel_len());
     let part = |i: usize| -> Result<T> {
         let count = BATCH.min(texels - i * BATCH);
-        let mut values = vec![0.0; count * columns];
-        dataset.read(i * BATCH, count, &mut Vec::new(), &mut values)?;
-        Ok(work(i * BATCH, &values))
+        BUFFERS.with_borrow_mut(|(bytes, values)| {
+            values.resize(count * columns, 0.0);
+            dataset.read(i * BATCH, count, bytes, values)?;
+            Ok(work(i * BATCH, values))
+        })
     };
     ordered(texels.div_ceil(BATCH), part, total, |total, _, result| fold(total, result))
 }
@@ -178,14 +187,17 @@ impl Pca<'_> {
         let scale = (largest - least).max(1e-30) / ((1u32 << bits) - 1) as f32;
         let mean: Vec<f32> = self.mean.iter().map(|m| least + ((m - least) / scale).round() * scale).collect();
         let work = |first: usize, values: &[f32]| {
-            let count = values.len() / columns;
-            let mut logs: Vec<f32> = mean.iter().copied().cycle().take(values.len()).collect();
-            if rank > 0 {
-                product_bt(&mut logs, &of_texels[first * rank..][..count * rank], &of_pairs, [count, rank, columns], true);
-            }
-            let mut sums = Sums::default();
-            values.iter().zip(logs).for_each(|(&wanted, log)| sums.compare(wanted, (log.exp() - offset).max(0.0), offset));
-            sums
+            LOGS.with_borrow_mut(|logs| {
+                logs.resize(values.len(), 0.0);
+                logs.chunks_mut(columns).for_each(|texel| texel.copy_from_slice(&mean));
+                let count = values.len() / columns;
+                if rank > 0 {
+                    product_bt(logs, &of_texels[first * rank..][..count * rank], &of_pairs, [count, rank, columns], true);
+                }
+                let mut sums = Sums::default();
+                values.iter().zip(logs).for_each(|(&wanted, log)| sums.compare(wanted, (log.exp() - offset).max(0.0), offset));
+                sums
+            })
         };
         let sums = pass(self.dataset, work, Sums::default(), |total, sums| total.add(sums))?;
         let row = sums.row(self.bytes(rank, bits));

@@ -16,6 +16,7 @@ use crate::linear::{Basis, eigenbasis, ordered, product, product_at, product_bt}
 use crate::sparsebtf::{LOG_OFFSET, YUV_TO_RGB};
 use crate::transfer::log2;
 use half::f16;
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::f32::consts::LN_2;
 
@@ -42,6 +43,14 @@ pub struct Published<'a> {
 struct Reader {
     bytes: Vec<u8>,
     run: Vec<f32>,
+}
+
+/// Planes of the three channels and what decoding needs beside them.
+type Planes = ([Vec<f32>; 3], Vec<f32>, Reader);
+
+thread_local! {
+    /// Reused from block to block: mapping fresh memory for each would take longer than the work.
+    static PLANES: RefCell<Planes> = RefCell::default();
 }
 
 /// The largest coefficients of a block in one dictionary, largest first: place in `[y][x][view column][light column]` and value.
@@ -268,24 +277,25 @@ impl Layout<'_> {
         let angular: [Vec<[Basis; 2]>; 3] = self.ensembles.each_ref().map(|ensemble| (0..ensemble.turns.len()).map(|k| ensemble.angular(k)).collect());
         let to_rgb = YUV_TO_RGB.map(|row| row.map(|m| m as f32));
         let work = |block: usize| -> Result<Sums> {
-            let (mut planes, mut scratch): ([Vec<f32>; 3], Vec<f32>) = Default::default();
-            for (c, plane) in planes.iter_mut().enumerate() {
-                let kept = |list: &'_ List| sparsity[c].min(list.len());
-                let energy = |list: &List| list[..kept(list)].iter().map(|v| (v.1 as f64).powi(2)).sum::<f64>();
-                let lists = &self.lists[block][c];
-                let energies: Vec<f64> = lists.iter().map(energy).collect();
-                let k = (1..lists.len()).fold(0, |best, k| if energies[k] > energies[best] { k } else { best });
-                decode(&lists[k][..kept(&lists[k])], &angular[c][k], &self.ensembles[c].turns[k], plane, &mut scratch);
-            }
-            let mut sums = Sums::default();
-            published.visit(block, &mut Reader::default(), |place, pair, rgb, real| {
-                if real {
-                    let yuv: [f32; 3] = std::array::from_fn(|c| planes[c][place] * published.deviations[pair] + published.means[pair]);
-                    let decoded = to_rgb.each_ref().map(|row| (row_times(row, yuv).exp() - LOG_OFFSET).max(0.0));
-                    (0..3).for_each(|c| sums.compare(rgb[c], decoded[c], offset));
+            PLANES.with_borrow_mut(|(planes, scratch, reader)| {
+                for (c, plane) in planes.iter_mut().enumerate() {
+                    let kept = |list: &'_ List| sparsity[c].min(list.len());
+                    let energy = |list: &List| list[..kept(list)].iter().map(|v| (v.1 as f64).powi(2)).sum::<f64>();
+                    let lists = &self.lists[block][c];
+                    let energies: Vec<f64> = lists.iter().map(energy).collect();
+                    let k = (1..lists.len()).fold(0, |best, k| if energies[k] > energies[best] { k } else { best });
+                    decode(&lists[k][..kept(&lists[k])], &angular[c][k], &self.ensembles[c].turns[k], plane, scratch);
                 }
-            })?;
-            Ok(sums)
+                let mut sums = Sums::default();
+                published.visit(block, reader, |place, pair, rgb, real| {
+                    if real {
+                        let yuv: [f32; 3] = std::array::from_fn(|c| planes[c][place] * published.deviations[pair] + published.means[pair]);
+                        let decoded = to_rgb.each_ref().map(|row| (row_times(row, yuv).exp() - LOG_OFFSET).max(0.0));
+                        (0..3).for_each(|c| sums.compare(rgb[c], decoded[c], offset));
+                    }
+                })?;
+                Ok(sums)
+            })
         };
         let sums = ordered(published.blocks(), work, Sums::default(), |total, _, sums| total.add(sums))?;
         let row = sums.row(published.bytes(coefficients));
