@@ -5,8 +5,11 @@
 //! With `SELVEDGE_DATA` the full 400 x 400 material is measured, without it the excerpt in the repository.
 
 use selvedge::{Direction, FilteredQuery, Limits, Rgb};
-use selvedge_tools::model::MaterialModel;
+use selvedge_tools::dataset::{Dataset, Sample};
+use selvedge_tools::encode::{Goal, Options, encode, prepare};
+use selvedge_tools::model::{MaterialModel, TransferModel};
 use selvedge_tools::random::Random;
+use selvedge_tools::synth::{Mesostructure, Request, synthesise};
 use selvedge_tools::{sparsebtf, write};
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
@@ -68,6 +71,41 @@ fn mean_operations(model: &MaterialModel) -> [f64; 2] {
     [sample / blocks * (1.0 + 1.0 / edge).powi(2), image / blocks / channels / (edge * edge) + 2.0]
 }
 
+/// Filtered RGB samples of an encoded material whose samples meet so many coefficients of each channel in the mean.
+fn encoded(folder: &Path, met: [usize; 3]) {
+    const EDGE: usize = 16;
+    let path = folder.join("cloth.selvset");
+    if !path.exists() {
+        let request = Request { kind: Mesostructure::Cloth, size: [64, 64], directions: 81, seed: 1, samples: 1, sample: Sample::Half };
+        synthesise(&request, &path, &|_, _| ()).expect("rendered");
+    }
+    let data = Dataset::open(&path).expect("just written");
+    let prepared = prepare(vec![&data], TransferModel::Log2 { offset: data.statistics().log_offset() }, &|_, _| ()).expect("readable");
+    // A sample meets (1 + 1/edge)^2 blocks in the mean.
+    let blocks = (1.0 + 1.0 / EDGE as f64).powi(2);
+    let counts = met.map(|n| (n as f64 / blocks).ceil() as usize);
+    let options = Options { edge: EDGE, goal: Goal::Coefficients(counts), ..Options::default() };
+    let encoded = encode(&prepared, &prepared.own_ensembles(EDGE), &options, &|_, _| ()).expect("encoded");
+    let material = selvedge::open(&encoded.bytes, &Limits::NONE).expect("legal");
+    let mut random = Random::new(9);
+    let queries: Vec<FilteredQuery> = (0..1 << 16)
+        .map(|_| FilteredQuery { u_q32: random.word(), v_q32: random.word(), light: direction(&mut random), view: direction(&mut random) })
+        .collect();
+    let mut scratch = vec![0; material.batch_scratch_len(queries.len())];
+    let mut out = vec![Rgb::default(); queries.len()];
+    material.sample_batch(&queries, &mut scratch, &mut out).expect("buffers fit");
+    for (query, rgb) in queries.iter().zip(&out) {
+        assert_eq!(material.filtered(query.u_q32, query.v_q32, query.light, query.view), *rgb, "the batch is not the plain path");
+    }
+    println!(
+        "filtered RGB, {met:?} coefficients met, batches of 65536 {}",
+        rate(queries.len() as f64, || {
+            material.sample_batch(&queries, &mut scratch, &mut out).expect("buffers fit");
+            black_box(&out);
+        })
+    );
+}
+
 fn main() {
     // Cargo passes --bench; run as a test, there is nothing to do.
     if std::env::args().any(|argument| argument == "--test") {
@@ -78,6 +116,9 @@ fn main() {
         None => (Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/sparsebtf"), None),
     };
     println!("target features: avx2 {}, data {}", cfg!(target_feature = "avx2"), folder.display());
+    let temporary = tempfile::tempdir().expect("a folder");
+    encoded(temporary.path(), [256, 64, 64]);
+    encoded(temporary.path(), [64, 16, 16]);
     let authors = sparsebtf::read_material(&folder, "carpet07", size).expect("data");
     let bytes = write::write_material(&authors.to_model(10).expect("model"));
     let material = selvedge::open(&bytes, &Limits::default()).expect("legal");
