@@ -635,11 +635,15 @@ fn text(metrics: &Metrics) -> String {
     )
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum KeepArg {
-    Texture,
-    Mean,
-    Nothing,
+fn parse_channels(text: &str) -> std::result::Result<[Keep; 3], String> {
+    let keep = |word: &str| match word.trim() {
+        "texture" => Ok(Keep::Texture),
+        "mean" => Ok(Keep::Mean),
+        "nothing" => Ok(Keep::Nothing),
+        _ => Err("texture, mean or nothing for each channel, as texture,mean,mean".to_owned()),
+    };
+    let parts: Vec<Keep> = text.split(',').map(keep).collect::<std::result::Result<_, _>>()?;
+    parts.try_into().map_err(|_| "three words, as texture,mean,mean".to_owned())
 }
 
 #[derive(Args)]
@@ -656,8 +660,8 @@ pub struct TrimArgs {
     #[arg(long)]
     levels: Option<u32>,
     /// What to keep of each channel, as texture,mean,mean
-    #[arg(long, value_delimiter = ',', num_args = 3, value_enum)]
-    channels: Option<Vec<KeepArg>>,
+    #[arg(long, value_parser = parse_channels)]
+    channels: Option<[Keep; 3]>,
     /// Drop dictionaries, atoms and columns that nothing uses
     #[arg(long)]
     unused: bool,
@@ -690,12 +694,7 @@ fn trim_file(args: TrimArgs) -> Result<u8> {
         warn_of_triangles(&args.source.file, &file);
         Ok(read::model_of(&file))
     })?;
-    let keep = |arg: &KeepArg| match arg {
-        KeepArg::Texture => Keep::Texture,
-        KeepArg::Mean => Keep::Mean,
-        KeepArg::Nothing => Keep::Nothing,
-    };
-    let channels = args.channels.as_ref().map_or(Trim::default().channels, |list| std::array::from_fn(|c| keep(&list[c])));
+    let channels = args.channels.unwrap_or(Trim::default().channels);
     let options = Trim { layers: args.layers, levels: args.levels, channels, unused: args.unused, lights: args.lights, views: args.views };
     let trimmed = trim(&model, &options)?;
     files::write(&args.output, &write::write_material(&trimmed))?;

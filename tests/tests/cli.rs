@@ -166,3 +166,78 @@ fn the_kernel_is_translated() {
     }
     assert!(!std::fs::read_to_string(folder.path().join("selvedge_functions.wgsl")).expect("WGSL").contains("@compute"));
 }
+
+/// From a model to a file and on, as a user would do it: every new command once, and its exit codes.
+#[test]
+fn synth_train_encode_compare_trim_blend_export_import() {
+    let folder = tempfile::tempdir().expect("folder");
+    let at = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
+    let (data, other, dictionary) = (at("checker.selvset"), at("other.selvset"), at("d.selvdict"));
+    assert_eq!(code(&["synth", "checker", "--size", "12x10", "--samples", "1", "-o", &data]), 0);
+    assert_eq!(code(&["synth", "checker", "--size", "12x10", "--samples", "1", "--seed", "2", "-o", &other]), 0);
+    let again = at("again.selvset");
+    assert_eq!(code(&["synth", "checker", "--size", "12x10", "--samples", "1", "--threads", "1", "-o", &again]), 0);
+    assert!(std::fs::read(&data).expect("data") == std::fs::read(&again).expect("data"), "threads change no byte");
+    assert_eq!(code(&["synth", "marble", "-o", &at("x")]), 1);
+
+    let training = ["--dictionaries", "2", "--edge", "4", "--iterations", "3", "--sparsity", "16,4,4", "--quiet"];
+    assert_eq!(code(&[["train", &other, "-o", &dictionary].as_slice(), &training].concat()), 0);
+    // A training that is killed in the middle goes on to the same file.
+    std::fs::create_dir(at("killed")).expect("a folder");
+    let killed = at("killed/d.selvdict");
+    let mut child = Command::new(program()).args([["train", &other, "-o", &killed].as_slice(), &training].concat()).spawn().expect("runs");
+    let state = folder.path().join("killed/d.selvdict.training");
+    while !state.exists() && child.try_wait().expect("a child").is_none() {
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    let _ = child.kill();
+    let _ = child.wait();
+    assert_eq!(code(&[["train", &other, "-o", &killed].as_slice(), &training].concat()), 0);
+    assert!(std::fs::read(&killed).expect("dictionary") == std::fs::read(&dictionary).expect("dictionary"), "the same file after all");
+
+    let (own, trained, external) = (at("own.selv"), at("trained.selv"), at("external.selv"));
+    let report = run(&["encode", &data, "-o", &own, "--rmse", "0.7", "--edge", "4", "--layers", "2", "--levels", "2", "--json"]);
+    assert!(report.status.success());
+    let report: serde_json::Value = serde_json::from_slice(&report.stdout).expect("JSON");
+    assert!(report["metrics"]["log_rms"].as_f64().expect("a number") <= 0.7);
+    assert_eq!(code(&["encode", &data, "-o", &trained, "--dictionary", &dictionary, "--edge", "4", "--size", "70k"]), 0);
+    assert_eq!(code(&["encode", &data, "-o", &external, "--dictionary", &dictionary, "--external", "--size", "70k"]), 0);
+    assert_eq!(code(&["validate", &own, &trained]), 0);
+    assert_eq!(code(&["validate", &external, "--dictionary", &dictionary]), 0);
+    assert_eq!(code(&["encode", &data, "-o", &at("x.selv")]), 1, "a goal is missing");
+    assert_eq!(code(&["encode", &data, "-o", &at("x.selv"), "--size", "10"]), 1, "too small");
+    assert!(!folder.path().join("x.selv").exists());
+
+    assert_eq!(code(&["compare", &data, &data]), 0);
+    let picture = at("compare.png");
+    assert_eq!(code(&["compare", &data, &own, "--by", "log-rms", "--fail", "0.7", "--warn", "0.7", "--picture", &picture]), 0);
+    assert_eq!(code(&["compare", &data, &own, "--by", "log-rms", "--fail", "0.9", "--warn", "0.01"]), 1);
+    assert_eq!(code(&["compare", &data, &own]), 2);
+    assert_eq!(code(&["compare", &data, "does-not-exist"]), 4);
+    assert_eq!(&std::fs::read(&picture).expect("png")[1..4], b"PNG");
+
+    let (trimmed, blended) = (at("trimmed.selv"), at("blended.selv"));
+    assert_eq!(code(&["trim", &own, "-o", &trimmed, "--layers", "1", "--levels", "1", "--unused", "--channels", "texture,mean,mean", "--lights", "50"]), 0);
+    assert_eq!(code(&["validate", &trimmed]), 0);
+    assert!(std::fs::metadata(&trimmed).expect("file").len() < std::fs::metadata(&own).expect("file").len());
+    let second = at("second.selv");
+    let encode_alike = |data: &str, file: &str| code(&["encode", data, "-o", file, "--rmse", "0.7", "--edge", "4", "--offset", "0.001"]);
+    assert_eq!((encode_alike(&data, &own), encode_alike(&other, &second)), (0, 0));
+    assert_eq!(code(&["blend", &own, &second, "--alpha", "0.3", "-o", &blended]), 0);
+    assert_eq!(code(&["blend", &own, &second, "--alpha", "0", "-o", &blended]), 0);
+    assert_eq!(code(&["compare", &own, &blended]), 0);
+    assert_eq!(code(&["blend", &own, &second, "--alpha", "2", "-o", &blended]), 1);
+    assert_eq!(code(&["compare", &data, &at("images")]), 4);
+
+    let small = at("small.selvset");
+    assert_eq!(code(&["synth", "checker", "--size", "2", "--samples", "1", "-o", &small]), 0);
+    assert_eq!(code(&["export", &small, "-o", &at("images")]), 0);
+    assert_eq!(code(&["import", &at("images"), "-o", &at("back.selvset")]), 0);
+    assert_eq!(code(&["compare", &small, &at("back.selvset")]), 0);
+    assert_eq!(code(&["compare", &small, &data]), 3, "other sizes");
+    // One image fewer, and the import says which is missing.
+    let gone = std::fs::read_dir(at("images")).expect("folder").filter_map(|e| e.ok()).map(|e| e.path()).find(|p| p.extension().is_some_and(|e| e == "exr"));
+    std::fs::remove_file(gone.expect("an image")).expect("removed");
+    assert_ne!(code(&["import", &at("images"), "-o", &at("broken.selvset")]), 0);
+    assert!(!folder.path().join("broken.selvset").exists());
+}

@@ -237,13 +237,16 @@ fn channel(setting: &Setting<'_>, ensemble: &Ensemble, candidates: &[&Candidates
 /// Magnitudes that a record may state, with room for rounding (10.7-7 at a shift of zero).
 const RECORD_SUM: f64 = 2000.0;
 
+/// Most coefficients of a record: their count has at most 15 bits (10.3-3).
+const RECORD_COUNT: usize = 32_767;
+
 /// Moves what a record has no room for to the next layer, the smallest first, and adds layers where they run out.
 fn spill(lists: &mut Vec<Vec<(AtomModel, f64)>>) {
     // A magnitude is rounded up to whole units, of which there are 32 in one.
     let share = |c: &(AtomModel, f64)| c.1.abs() + 1.0 / 32.0;
     let mut layer = 0;
     while layer < lists.len() {
-        if lists[layer].iter().map(share).sum::<f64>() > RECORD_SUM {
+        if lists[layer].len() > RECORD_COUNT || lists[layer].iter().map(share).sum::<f64>() > RECORD_SUM {
             let list = &mut lists[layer];
             list.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()).then(a.0.word().cmp(&b.0.word())));
             let mut sum = 0.0;
@@ -251,7 +254,7 @@ fn spill(lists: &mut Vec<Vec<(AtomModel, f64)>>) {
                 sum += share(c);
                 sum <= RECORD_SUM
             });
-            let kept = room.count().max(1);
+            let kept = room.take(RECORD_COUNT).count().max(1);
             let rest = list.split_off(kept);
             if layer + 1 == lists.len() {
                 lists.push(Vec::new());

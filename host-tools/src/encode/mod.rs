@@ -272,7 +272,7 @@ impl<'a> Search<'a> {
                 return Ok(best);
             }
             let (mut low, mut high) = (least.ln(), least.ln() + 25.0);
-            for _ in 0..24 {
+            for _ in 0..14 {
                 let middle = (low + high) / 2.0;
                 if lost(middle.exp())? <= target { low = middle } else { high = middle }
             }
