@@ -395,10 +395,13 @@ fn encode(args: EncodeArgs) -> Result<u8> {
     if args.value_bits.is_some_and(|bits| bits.iter().any(|b| !(1..=16).contains(b))) {
         return Err(ToolError::Usage("--value-bits: 1 to 16".into()));
     }
+    if args.offset.is_some_and(|offset| !(1.2e-38..=1.0).contains(&offset)) {
+        return Err(ToolError::Usage("--offset: a normal number up to 1".into()));
+    }
     let data = Dataset::open(&args.dataset)?;
     let statistics = data.statistics();
     let transfer = match args.transfer {
-        Domain::Log => TransferModel::Log2 { offset: args.offset.map_or(statistics.log_offset(), |offset| offset as f32) },
+        Domain::Log => TransferModel::Log2 { offset: args.offset.map_or(statistics.coded_offset(), |offset| offset as f32) },
         // Values below 16, so that a texture is far below its bound of 32.
         Domain::Linear => TransferModel::Linear { exponent: (statistics.largest.max(1e-30).log2().ceil() as i32 - 4).clamp(-60, 60) },
     };

@@ -9,12 +9,12 @@
 //! [`Statistics`]. The file is a tool's working file, not a format to publish; `.selv` is.
 
 use crate::error::{Result, ToolError};
+use crate::files::{read_exact_at, write_all_at};
 use glam::DVec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::Write as _;
-use std::os::unix::fs::FileExt as _;
 use std::path::{Path, PathBuf};
 
 const MAGIC: &[u8; 8] = b"\x93SELVSET";
@@ -126,6 +126,13 @@ impl Statistics {
     }
 }
 
+impl Statistics {
+    /// The offset that logarithms are coded with: that of errors, but at most 1 (3.1-16).
+    pub fn coded_offset(&self) -> f32 {
+        self.log_offset().min(1.0)
+    }
+}
+
 #[derive(Serialize, Deserialize)]
 struct Head {
     description: Description,
@@ -178,7 +185,7 @@ impl Writer {
             Sample::Float => values.iter().flat_map(|v| v.to_le_bytes()).collect(),
         };
         let at = (texel * self.description.texel_len() + first_pair * 3) as u64 * self.description.sample.len_bytes() as u64;
-        self.file.as_file().write_all_at(&bytes, HEAD_LENGTH + at).map_err(ToolError::io(&self.path))
+        write_all_at(self.file.as_file(), &bytes, HEAD_LENGTH + at).map_err(ToolError::io(&self.path))
     }
 
     fn texel_place(&self, texel: usize) -> [usize; 2] {
@@ -206,7 +213,7 @@ impl Writer {
         start.extend((head.len() as u64).to_le_bytes());
         start.extend(head);
         start.resize(HEAD_LENGTH as usize, 0);
-        self.file.as_file().write_all_at(&start, 0).map_err(ToolError::io(&self.path))?;
+        write_all_at(self.file.as_file(), &start, 0).map_err(ToolError::io(&self.path))?;
         self.file.flush().map_err(ToolError::io(&self.path))?;
         crate::files::persist(self.file, &self.path)?;
         Ok(statistics)
@@ -231,7 +238,7 @@ impl Dataset {
         let file = File::open(path).map_err(ToolError::io(path))?;
         let length = file.metadata().map_err(ToolError::io(path))?.len();
         let mut start = vec![0; HEAD_LENGTH.min(length) as usize];
-        file.read_exact_at(&mut start, 0).map_err(ToolError::io(path))?;
+        read_exact_at(&file, &mut start, 0).map_err(ToolError::io(path))?;
         if start.len() < HEAD_LENGTH as usize || &start[..8] != MAGIC {
             return Err(invalid(path, 0, "this is not a dataset"));
         }
@@ -250,7 +257,7 @@ impl Dataset {
     /// Whether a file begins as a dataset does.
     pub fn is_one(path: &Path) -> bool {
         let mut magic = [0; 8];
-        File::open(path).and_then(|file| file.read_exact_at(&mut magic, 0)).is_ok() && &magic == MAGIC
+        File::open(path).and_then(|file| read_exact_at(&file, &mut magic, 0)).is_ok() && &magic == MAGIC
     }
 
     /// Where it is.
@@ -288,7 +295,7 @@ impl Dataset {
         let size = self.description.sample.len_bytes();
         bytes.resize(values.len() * size, 0);
         let at = HEAD_LENGTH + (first * size) as u64;
-        self.file.read_exact_at(bytes, at).map_err(ToolError::io(&self.path))?;
+        read_exact_at(&self.file, bytes, at).map_err(ToolError::io(&self.path))?;
         match self.description.sample {
             Sample::Half => {
                 use half::slice::HalfFloatSliceExt as _;

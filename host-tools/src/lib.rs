@@ -5,9 +5,15 @@
 //! | [`sparsebtf`] | reads the files of SparseBTF 2023 |
 //! | [`folder`] | a folder of images becomes a dataset, and back |
 //! | [`model`], [`write`](mod@write), [`triangulate`] | a quantised material in memory, and its bytes |
+//! | [`dataset`], [`directions`], [`pyramid`] | the working file of a material's data, its grids, its levels of detail |
+//! | [`synth`] | data of modelled mesostructures |
+//! | [`transfer`], [`blocks`], [`linear`] | radiance to channels, blocks and moments, matrices |
+//! | [`dictionary`], [`train`](mod@train), [`dictionary_file`] | ensembles in floats, their training, their files |
+//! | [`encode`](mod@encode), [`measure`] | data become a file for a goal; how far two materials are apart |
 //! | [`quantise`] | coefficients become integers |
 //! | [`read`], [`trim`](mod@trim), [`sector`] | a file becomes a model again, and a smaller one |
 //! | [`blend`](mod@blend), [`basis`] | a material between two |
+//! | [`story`], [`progress`] | the encoder's part of the demo; a line on a terminal |
 //! | [`inspect`], [`picture`], [`demo`] | what `info`, `validate`, `decode` and `demo` show |
 //! | [`kernel`], [`gpu`] | the kernel for other renderers, and run here |
 //! | [`example`], [`extreme`], [`random`] | files that the specification and the tests use |

@@ -71,7 +71,7 @@ pub fn tell(out: &Path, say: &mut dyn FnMut(String)) -> Result<Story> {
     let temporary = tempfile::tempdir_in(&data_folder).map_err(ToolError::io(&data_folder))?;
     let coarser = pyramid::levels(cloth, 3, temporary.path())?;
     let levels: Vec<&Dataset> = std::iter::once(cloth).chain(&coarser).collect();
-    let transfer = TransferModel::Log2 { offset: cloth.statistics().log_offset() };
+    let transfer = TransferModel::Log2 { offset: cloth.statistics().coded_offset() };
     let prepared = prepare(levels, transfer, &|_, _| ())?;
     let raw = cloth.description().half_bytes();
     let options = Options { layers: 2, ..Options::default() };

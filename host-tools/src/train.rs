@@ -159,7 +159,7 @@ pub fn train(datasets: &[&Dataset], options: &Options, state: Option<&Path>, tel
     };
     let mut prepared = Vec::new();
     for dataset in datasets {
-        prepared.push(prepare(vec![dataset], TransferModel::Log2 { offset: dataset.statistics().log_offset() }, &|_, _| ())?);
+        prepared.push(prepare(vec![dataset], TransferModel::Log2 { offset: dataset.statistics().coded_offset() }, &|_, _| ())?);
     }
     let chosen = choose_blocks(&prepared, options);
     let subspaces = [lights, views].map(|n| options.subspace.clamp(1, n));

@@ -40,7 +40,7 @@ fn material(path: &Path, size: [usize; 2], directions: usize, scale: f32, seed: 
 }
 
 fn transfer(data: &Dataset) -> TransferModel {
-    TransferModel::Log2 { offset: data.statistics().log_offset() }
+    TransferModel::Log2 { offset: data.statistics().coded_offset() }
 }
 
 fn open(bytes: &[u8]) -> Selvedge<'_> {
