@@ -40,6 +40,12 @@ fn direction(random: &mut Random) -> Direction {
     Direction::from_unit_vector([r * azimuth.cos(), r * azimuth.sin(), z])
 }
 
+/// Random queries over the whole image and hemisphere.
+fn queries(seed: u64) -> Vec<FilteredQuery> {
+    let mut random = Random::new(seed);
+    (0..1 << 16).map(|_| FilteredQuery { u_q32: random.word(), v_q32: random.word(), light: direction(&mut random), view: direction(&mut random) }).collect()
+}
+
 /// Mean operations of the records of a model: for one filtered sample, and for a texel of an image of one channel.
 ///
 /// Counted from the records themselves, by what 10.7 multiplies: an unpacked coefficient 1, its two columns 3
@@ -87,10 +93,7 @@ fn encoded(folder: &Path, met: [usize; 3]) {
     let options = Options { edge: EDGE, goal: Goal::Coefficients(counts), ..Options::default() };
     let encoded = encode(&prepared, &prepared.own_ensembles(EDGE), &options, &|_, _| ()).expect("encoded");
     let material = selvedge::open(&encoded.bytes, &Limits::NONE).expect("legal");
-    let mut random = Random::new(9);
-    let queries: Vec<FilteredQuery> = (0..1 << 16)
-        .map(|_| FilteredQuery { u_q32: random.word(), v_q32: random.word(), light: direction(&mut random), view: direction(&mut random) })
-        .collect();
+    let queries = queries(9);
     let mut scratch = vec![0; material.batch_scratch_len(queries.len())];
     let mut out = vec![Rgb::default(); queries.len()];
     material.sample_batch(&queries, &mut scratch, &mut out).expect("buffers fit");
@@ -126,10 +129,7 @@ fn main() {
     println!("{} bytes, {} operations a filtered sample at worst", bytes.len(), material.header().operations);
     println!("in the mean {sample:.0} operations for the records of a filtered sample, {texel:.1} for a channel texel of an image");
 
-    let mut random = Random::new(7);
-    let queries: Vec<FilteredQuery> = (0..1 << 16)
-        .map(|_| FilteredQuery { u_q32: random.word(), v_q32: random.word(), light: direction(&mut random), view: direction(&mut random) })
-        .collect();
+    let queries = queries(7);
     let mut scratch = vec![0; material.batch_scratch_len(queries.len())];
     let mut out = vec![Rgb::default(); queries.len()];
     material.sample_batch(&queries, &mut scratch, &mut out).expect("buffers fit");
