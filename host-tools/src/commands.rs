@@ -405,7 +405,7 @@ fn encode(args: EncodeArgs) -> Result<u8> {
         // Values below 16, so that a texture is far below its bound of 32.
         Domain::Linear => TransferModel::Linear { exponent: (statistics.largest.max(1e-30).log2().ceil() as i32 - 4).clamp(-60, 60) },
     };
-    let beside = args.output.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let beside = files::folder_of(&args.output);
     let temporary = tempfile::Builder::new().prefix(".selvedge-").tempdir_in(beside).map_err(ToolError::io(beside))?;
     let coarser = pyramid::levels(&data, args.levels as usize, temporary.path())?;
     let progress = Progress::new();

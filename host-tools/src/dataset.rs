@@ -9,7 +9,7 @@
 //! [`Statistics`]. The file is a tool's working file, not a format to publish; `.selv` is.
 
 use crate::error::{Result, ToolError};
-use crate::files::{read_exact_at, write_all_at};
+use crate::files::{folder_of, read_exact_at, write_all_at};
 use glam::DVec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -157,7 +157,7 @@ impl Writer {
     /// If the description is beyond what a dataset can be, or the folder cannot be written to.
     pub fn create(path: &Path, description: Description) -> Result<Writer> {
         description.check().map_err(|what| ToolError::Usage(format!("{}: {what}", path.display())))?;
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder = folder_of(path);
         let file = tempfile::Builder::new().prefix(".selvedge-").tempfile_in(folder).map_err(|error| ToolError::io(path)(error.kind().into()))?;
         let length = HEAD_LENGTH + description.texels() as u64 * description.texel_len() as u64 * description.sample.len_bytes() as u64;
         file.as_file().set_len(length).map_err(ToolError::io(path))?;

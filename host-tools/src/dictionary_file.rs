@@ -4,6 +4,7 @@
 //! of an optional kind as JSON, which decoders skip.
 
 use crate::dictionary::{Ensemble, Turn};
+use crate::encode::assemble::Used;
 use crate::error::{Result, ToolError};
 use crate::linear::{Basis, nearest_orthogonal, product_at};
 use crate::model::{ChannelModel, DictionaryModel, EnsembleModel, FactorModel, MaterialModel, MetadataModel, TransferModel};
@@ -48,9 +49,7 @@ pub struct DictionaryFile {
 }
 
 fn to_factor(basis: &Basis) -> FactorModel {
-    let largest: Vec<f64> = (0..basis.columns).map(|c| (0..basis.rows).fold(1e-30f64, |m, r| m.max((basis.at(r, c) as f64).abs()))).collect();
-    let entry = |i: usize| (basis.entries[i] as f64 * 32_767.0 / largest[i % basis.columns]).round() as i16;
-    FactorModel { columns: basis.columns as u32, entries: (0..basis.entries.len()).map(entry).collect() }
+    Used::new(basis, &vec![true; basis.columns]).factor
 }
 
 fn to_basis(factor: &FactorModel) -> Basis {

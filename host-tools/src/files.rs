@@ -31,10 +31,15 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
         return open.write_all(bytes).map_err(ToolError::io(path));
     }
     let path = target.as_path();
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = folder_of(path);
     let mut beside = tempfile::Builder::new().prefix(".selvedge-").tempfile_in(folder).map_err(|error| ToolError::io(path)(error.kind().into()))?;
     beside.write_all(bytes).and_then(|()| beside.as_file().sync_all()).map_err(ToolError::io(path))?;
     persist(beside, path)
+}
+
+/// The folder that a file is in or will be in.
+pub fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// Reads at an offset, without a cursor that threads would share.

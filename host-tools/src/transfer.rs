@@ -41,6 +41,8 @@ pub struct Forward {
     pub transfer: TransferModel,
     /// Channels from colours: the inverse of the matrix of the file.
     from_rgb: [[f32; 3]; 3],
+    /// Factor of linear values, a power of two.
+    scale: f32,
 }
 
 impl Forward {
@@ -48,7 +50,8 @@ impl Forward {
     pub fn new(transfer: TransferModel) -> Forward {
         let q = matrix_q13().map(|m| m as f64 / 8192.0);
         let matrix = glam::DMat3::from_cols_array(&q).transpose().inverse();
-        Forward { transfer, from_rgb: std::array::from_fn(|r| std::array::from_fn(|c| matrix.row(r)[c] as f32)) }
+        let scale = if let TransferModel::Linear { exponent } = transfer { (-exponent as f32).exp2() } else { 1.0 };
+        Forward { transfer, scale, from_rgb: std::array::from_fn(|r| std::array::from_fn(|c| matrix.row(r)[c] as f32)) }
     }
 
     /// The three channels of one colour.
@@ -56,7 +59,7 @@ impl Forward {
     pub fn channels(&self, rgb: [f32; 3]) -> [f32; 3] {
         let v = match self.transfer {
             TransferModel::Log2 { offset } => rgb.map(|x| log2(x + offset)),
-            TransferModel::Linear { exponent } => rgb.map(|x| x * (-exponent as f32).exp2()),
+            TransferModel::Linear { .. } => rgb.map(|x| x * self.scale),
         };
         self.from_rgb.map(|m| m[0] * v[0] + m[1] * v[1] + m[2] * v[2])
     }

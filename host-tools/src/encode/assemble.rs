@@ -10,7 +10,7 @@ use crate::linear::Basis;
 use crate::model::{
     AtomModel, ChannelModel, CoefficientsModel, DictionaryModel, EnsembleModel, FactorModel, MaterialModel, MetadataModel, PairTableModel, RecordModel,
 };
-use crate::quantise::{FloatRecord, quantise, quantise_means};
+use crate::quantise::{FloatRecord, Quantised, quantise, quantise_means};
 use crate::transfer::matrix_q13;
 use crate::triangulate::{project, triangulate};
 use selvedge::cost::{Shape, filtered_operations};
@@ -54,8 +54,8 @@ pub fn fixed_operations(description: &Description) -> u64 {
 }
 
 /// Columns of a basis that are used, each scaled to its largest entry.
-struct Used {
-    factor: FactorModel,
+pub(crate) struct Used {
+    pub(crate) factor: FactorModel,
     /// New number of each column.
     number: Vec<u32>,
     /// Largest entry of each new column.
@@ -75,7 +75,8 @@ impl Used {
         Used { factor: factor.clone(), number: (0..factor.columns).collect(), scale }
     }
 
-    fn new(basis: &Basis, used: &[bool]) -> Used {
+    /// Those columns of a basis that are used.
+    pub(crate) fn new(basis: &Basis, used: &[bool]) -> Used {
         let mut number = vec![UNUSED; basis.columns];
         let mut scales = Vec::new();
         let mut columns = Vec::new();
@@ -216,22 +217,21 @@ fn channel(setting: &Setting<'_>, ensemble: &Ensemble, candidates: &[&Candidates
     for (records, candidates) in records.iter_mut().zip(candidates) {
         records.resize(layers, vec![(0, Vec::new()); candidates.dictionaries.len()]);
     }
-    let quantised = |bits: u32| -> Result<(EnsembleModel, f64)> {
+    let quantised = |bits: u32| -> Result<(Quantised, f64)> {
         let (atoms, coefficients) = quantise(&records, dictionaries.len(), &vec![vec![bits; layers]; candidates.len()])?;
         let lost = records[0].iter().zip(&coefficients[0]).map(|(records, coefficients)| rounding(records, coefficients, &atoms, &tables)).sum();
-        Ok((EnsembleModel { dictionaries: dictionaries.clone(), atoms, coefficients }, lost))
+        Ok(((atoms, coefficients), lost))
     };
-    if let Some(bits) = bits {
-        return quantised(bits);
-    }
+    let (mut chosen, mut lost) = quantised(bits.unwrap_or(FIRST_BITS))?;
     // A bit more for every value costs its price, and takes three quarters of the rounding away.
-    let (model, lost) = quantised(FIRST_BITS)?;
     let price = setting.threshold.powi(2) / COEFFICIENT_BITS * selection.count as f64;
     let loss = |bits: u32| lost * 4f64.powi(FIRST_BITS as i32 - bits as i32) + price * bits as f64;
-    match (3..=14).min_by(|&a, &b| loss(a).total_cmp(&loss(b))) {
-        Some(bits) if bits != FIRST_BITS => quantised(bits),
-        _ => Ok((model, lost)),
+    let best = (3..=14).min_by(|&a, &b| loss(a).total_cmp(&loss(b))).unwrap_or(FIRST_BITS);
+    if bits.is_none() && best != FIRST_BITS {
+        (chosen, lost) = quantised(best)?;
     }
+    let (atoms, coefficients) = chosen;
+    Ok((EnsembleModel { dictionaries, atoms, coefficients }, lost))
 }
 
 /// Magnitudes that a record may state, with room for rounding (10.7-7 at a shift of zero).

@@ -71,6 +71,8 @@ pub struct Encoded {
     pub coefficients: [usize; 3],
     /// The threshold.
     pub threshold: f64,
+    /// Energy of the coefficients of level 0 that were left out.
+    pub lost: f64,
     /// Predicted root mean squared error over level 0, in the domain of the channels (`ln`, or linear).
     pub predicted_rms: f64,
 }
@@ -277,9 +279,8 @@ impl<'a> Search<'a> {
                 if lost(middle.exp())? <= target { low = middle } else { high = middle }
             }
             let encoded = self.at(low.exp())?;
-            let lost = lost(low.exp())?;
             let total = (encoded.predicted_rms / self.prepared.unit()).powi(2) * self.prepared.values(self.options.edge);
-            rounding = if lost > 0.0 { (total - lost) / lost } else { 0.0 };
+            rounding = if encoded.lost > 0.0 { (total - encoded.lost) / encoded.lost } else { 0.0 };
             let (reached, near) = (total <= goal, (total - goal).abs() < 0.01 * goal);
             if reached {
                 best = Some(encoded);
@@ -291,10 +292,7 @@ impl<'a> Search<'a> {
                 rounding *= 1.01;
             }
         }
-        match best {
-            Some(best) => Ok(Some(best)),
-            None => Ok(None),
-        }
+        Ok(best)
     }
 }
 
@@ -364,5 +362,5 @@ fn finish(
     let lost: f64 = selections.iter().map(|selection| selection.lost_at_0).sum();
     let predicted_rms = prepared.unit() * ((lost + rounding) / prepared.values(options.edge)).sqrt();
     let coefficients = selections.each_ref().map(|selection| selection.kept[0].iter().map(Vec::len).sum());
-    Ok(Encoded { model, bytes, coefficients, threshold, predicted_rms })
+    Ok(Encoded { model, bytes, coefficients, threshold, lost, predicted_rms })
 }
