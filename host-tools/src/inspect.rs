@@ -7,6 +7,11 @@ use serde::Serialize;
 /// Most findings that are kept in words for one rule; all are counted.
 const KEPT: usize = 20;
 
+/// Whether bytes are those of a dictionary file.
+pub fn is_dictionary(bytes: &[u8]) -> bool {
+    bytes.get(16..20) == Some(&selvedge::header::CONTENT_DICTIONARY.to_le_bytes())
+}
+
 /// One finding, as JSON.
 #[derive(Clone, Debug, Serialize, PartialEq, Eq)]
 pub struct FindingReport {

@@ -17,6 +17,7 @@
 //! | [`inspect`], [`picture`], [`demo`] | what `info`, `validate`, `decode` and `demo` show |
 //! | [`kernel`], [`gpu`] | the kernel for other renderers, and run here |
 //! | [`example`], [`extreme`], [`random`] | files that the specification and the tests use |
+//! | [`vectors`], [`conform`] | the conformance suite, made of recipes; decoders held against it |
 //! | [`baseline`] | what the encoder is measured against |
 //! | [`files`], [`error`] | whole writes, exit codes |
 
@@ -24,6 +25,7 @@ pub mod baseline;
 pub mod basis;
 pub mod blend;
 pub mod blocks;
+pub mod conform;
 pub mod dataset;
 pub mod demo;
 pub mod dictionary;
@@ -56,4 +58,5 @@ pub mod train;
 pub mod transfer;
 pub mod triangulate;
 pub mod trim;
+pub mod vectors;
 pub mod write;

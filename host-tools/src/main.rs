@@ -8,7 +8,7 @@ use clap::{Args, Parser, Subcommand};
 use selvedge::header::CONTENT_DICTIONARY;
 use selvedge::{Direction, Limits};
 use selvedge_tools::error::{Result, ToolError};
-use selvedge_tools::{demo, files, inspect, kernel, sparsebtf, write};
+use selvedge_tools::{conform, demo, files, inspect, kernel, sparsebtf, vectors, write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -74,6 +74,17 @@ enum Command {
         /// As JSON
         #[arg(long)]
         json: bool,
+    },
+    /// Hold this decoder, or a program that answers over its standard streams, against the conformance suite
+    Conform {
+        /// Folder of the suite, with its manifest.tsv
+        folder: PathBuf,
+        /// Make the files of the suite from its recipes first
+        #[arg(long)]
+        make: bool,
+        /// The program and its arguments, behind --
+        #[arg(last = true)]
+        program: Vec<String>,
     },
     /// Write the image for one light and one view as .png or .exr
     Decode {
@@ -168,11 +179,6 @@ fn print_json(value: &impl serde::Serialize) -> Result<()> {
     print(&(serde_json::to_string_pretty(value).expect("plain data") + "\n"))
 }
 
-/// Whether bytes are those of a dictionary file.
-fn is_dictionary(bytes: &[u8]) -> bool {
-    bytes.get(16..20) == Some(&CONTENT_DICTIONARY.to_le_bytes())
-}
-
 /// A material's bytes, opened for as long as `use_it` runs.
 fn with_material<T>(source: &Source, use_it: impl FnOnce(selvedge::Selvedge<'_>) -> Result<T>) -> Result<T> {
     let bytes = files::read(&source.file)?;
@@ -220,7 +226,7 @@ fn validate(paths: &[PathBuf], dictionary: Option<&Path>, limits: &Limits, json:
                 continue;
             }
         };
-        let own = dictionary.as_deref().filter(|_| !is_dictionary(&bytes));
+        let own = dictionary.as_deref().filter(|_| !inspect::is_dictionary(&bytes));
         let report = inspect::validate(&path.display().to_string(), &bytes, own, limits);
         code = if code == 0 { report.exit_code } else { code };
         if !json {
@@ -232,6 +238,20 @@ fn validate(paths: &[PathBuf], dictionary: Option<&Path>, limits: &Limits, json:
         print_json(&reports)?;
     }
     Ok(code)
+}
+
+/// Tells every vector that is answered otherwise than its suite states.
+fn conform(folder: &Path, make: bool, program: &[String]) -> Result<u8> {
+    if make {
+        vectors::write(folder)?;
+    }
+    let suite = vectors::read(folder)?;
+    let found = if program.is_empty() { conform::run_own(&suite)? } else { conform::run_program(&suite, program)? };
+    for d in &found {
+        print(&format!("{}: {} is stated, {} was answered\n", d.path, d.stated, d.answered))?;
+    }
+    eprintln!("{} vectors, {} answered otherwise than stated", suite.len(), found.len());
+    Ok(if found.is_empty() { 0 } else { 3 })
 }
 
 fn run(cli: Cli) -> Result<u8> {
@@ -254,6 +274,7 @@ fn run(cli: Cli) -> Result<u8> {
             Ok(0)
         }),
         Command::Validate { files, dictionary, limits, json } => validate(&files, dictionary.as_deref(), &limits.limits(), json),
+        Command::Conform { folder, make, program } => conform(&folder, make, &program),
         Command::Decode { source, output, light, view, level, layers, exposure } => with_material(&source, |material| {
             let header = material.header();
             let most = [("--level", level, 0, header.level_count - 1), ("--layers", layers.unwrap_or(1), 1, header.layer_count)];

@@ -3,8 +3,10 @@
 //! Whoever makes a file (an importer, an encoder, a generator of test files) fills a [`MaterialModel`];
 //! [`crate::write`] turns it into bytes. All numbers have the meaning of the specification.
 
+use serde::{Deserialize, Serialize};
+
 /// A whole material.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MaterialModel {
     /// Texels along x and y.
     pub size: [u32; 2],
@@ -40,7 +42,7 @@ impl MaterialModel {
 }
 
 /// Chapter 7.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum TransferModel {
     /// Base-two logarithm of radiance plus an offset.
     Log2 {
@@ -55,7 +57,7 @@ pub enum TransferModel {
 }
 
 /// Chapter 3.4.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MetadataModel {
     /// Width and height of a texel in nanometres, 0 if unknown.
     pub texel_nm: [u32; 2],
@@ -70,7 +72,7 @@ pub struct MetadataModel {
 }
 
 /// One channel; which parts are there says whether it is missing, a mean, or full.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ChannelModel {
     /// Means for pairs of directions.
     pub mean: Option<PairTableModel>,
@@ -92,7 +94,7 @@ impl ChannelModel {
 }
 
 /// Chapters 8.1 and 8.2.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PairTableModel {
     /// Added to every entry, Q20.
     pub base_q20: i32,
@@ -103,7 +105,7 @@ pub struct PairTableModel {
 }
 
 /// `rows` x `columns` numbers in Q15, row by row.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FactorModel {
     /// Columns.
     pub columns: u32,
@@ -112,7 +114,7 @@ pub struct FactorModel {
 }
 
 /// One dictionary: four factors.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DictionaryModel {
     /// Rows are light directions.
     pub light: FactorModel,
@@ -125,7 +127,7 @@ pub struct DictionaryModel {
 }
 
 /// An atom: a column of each factor, and how its values are quantised.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct AtomModel {
     /// Column of the light factor.
     pub light: u32,
@@ -156,7 +158,7 @@ impl AtomModel {
 }
 
 /// The texture of a channel.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct EnsembleModel {
     /// The ensemble.
     pub dictionaries: Vec<DictionaryModel>,
@@ -167,7 +169,7 @@ pub struct EnsembleModel {
 }
 
 /// The records of one level and layer.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CoefficientsModel {
     /// Bits of a value.
     pub value_bits: u32,
@@ -176,7 +178,7 @@ pub struct CoefficientsModel {
 }
 
 /// The record of one block.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RecordModel {
     /// Which dictionary.
     pub dictionary: u32,
