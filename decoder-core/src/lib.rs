@@ -88,6 +88,6 @@ pub use header::Header;
 pub use limits::Limits;
 pub use material::Material;
 pub use metadata::Metadata;
-pub use open::{Selvedge, open, open_with, validate};
+pub use open::{Selvedge, open, open_telling, open_with, validate};
 pub use result::{BufferTooSmall, position_from_f32};
 pub use sha256::{Digest, Sha256, sha256};

@@ -60,6 +60,11 @@ pub fn open_with<'a>(bytes: &'a [u8], dictionary: Option<&'a [u8]>, limits: &Lim
     }
 }
 
+/// Opens a material as [`open_with`] does and tells every finding, not only the first: `Some` if there is none.
+pub fn open_telling<'a>(bytes: &'a [u8], dictionary: Option<&'a [u8]>, limits: &Limits, sink: &mut dyn Sink) -> Option<Selvedge<'a>> {
+    check_material(bytes, dictionary, limits, sink)
+}
+
 /// Walks all rules over a file of either content and tells every finding; `true` if there is none.
 pub fn validate(bytes: &[u8], dictionary: Option<&[u8]>, limits: &Limits, sink: &mut dyn Sink) -> bool {
     let words = Words { file: bytes, dictionary: &[] };

@@ -5,7 +5,7 @@
 use crate::error::{Result, ToolError};
 use crate::picture::{Picture, false_colour};
 use crate::sparsebtf::{AuthorsMaterial, read_material};
-use crate::{files, inspect, story, write};
+use crate::{files, inspect, story, validate, write};
 use selvedge::batch::FilteredQuery;
 use selvedge::{Direction, Limits, Rgb, Selvedge};
 use std::f64::consts::LN_2;
@@ -225,9 +225,9 @@ pub fn run(out: &Path, say: &mut dyn FnMut(String)) -> Result<()> {
     written.extend(story.written);
     let mut materials = Vec::new();
     for (path, bytes) in &written {
-        let report = inspect::validate(&path.display().to_string(), bytes, None, &Limits::default());
+        let report = validate::validate(&path.display().to_string(), bytes, None, &validate::Options::default());
         let opened = selvedge::open(bytes, &Limits::default()).map_err(|finding| ToolError::Invalid { path: path.clone(), finding })?;
-        say(format!("{}: {} findings, decode digest {}", path.display(), report.count, &inspect::hex(&opened.decode_digest())[..16]));
+        say(format!("{}: {} findings, decode digest {}", path.display(), report.count(), &inspect::hex(&opened.decode_digest())[..16]));
         materials.push(opened);
     }
     let gpu_line = compare_with_gpu(&materials, say)?;

@@ -1,101 +1,12 @@
-//! What `info` and `validate` tell: the same facts as text and as JSON.
+//! What `info` tells: the same facts as text and as JSON.
 
+use selvedge::Selvedge;
 use selvedge::directory::{ANGULAR, ATOMS, COEFFICIENTS, DIRECTIONS, EXTERNAL, MEANS, METADATA, OPTIONAL, SCALES, SPATIAL};
-use selvedge::{Finding, Limits, Part, Selvedge};
 use serde::Serialize;
-
-/// Most findings that are kept in words for one rule; all are counted.
-const KEPT: usize = 20;
 
 /// Whether bytes are those of a dictionary file.
 pub fn is_dictionary(bytes: &[u8]) -> bool {
     bytes.get(16..20) == Some(&selvedge::header::CONTENT_DICTIONARY.to_le_bytes())
-}
-
-/// One finding, as JSON.
-#[derive(Clone, Debug, Serialize, PartialEq, Eq)]
-pub struct FindingReport {
-    /// Number of the rule.
-    pub rule: &'static str,
-    /// Name of the rule.
-    pub name: &'static str,
-    /// What it asks for.
-    pub title: &'static str,
-    /// `invalid`, `unsupported`, `limits` or `usage`.
-    pub family: &'static str,
-    /// `file` or `dictionary`.
-    pub part: &'static str,
-    /// Byte offset.
-    pub offset: u32,
-    /// What was found there.
-    pub found: u32,
-}
-
-impl From<Finding> for FindingReport {
-    fn from(finding: Finding) -> Self {
-        FindingReport {
-            rule: finding.rule.id(),
-            name: finding.rule.name(),
-            title: finding.rule.title(),
-            family: match finding.rule.family() {
-                selvedge::Family::Invalid => "invalid",
-                selvedge::Family::Unsupported => "unsupported",
-                selvedge::Family::Limits => "limits",
-                selvedge::Family::Usage => "usage",
-            },
-            part: if finding.part == Part::File { "file" } else { "dictionary" },
-            offset: finding.offset,
-            found: finding.found,
-        }
-    }
-}
-
-/// Everything found in one file, as JSON.
-#[derive(Clone, Debug, Default, Serialize)]
-pub struct Validation {
-    /// The file, as it was named.
-    pub file: String,
-    /// No rule is broken.
-    pub valid: bool,
-    /// How many findings there were.
-    pub count: usize,
-    /// The findings, at most twenty for a rule.
-    pub findings: Vec<FindingReport>,
-    /// The exit code of the first.
-    #[serde(skip)]
-    pub exit_code: u8,
-}
-
-/// Walks all rules over a file.
-pub fn validate(name: &str, bytes: &[u8], dictionary: Option<&[u8]>, limits: &Limits) -> Validation {
-    let mut report = Validation { file: name.to_owned(), ..Validation::default() };
-    let mut kept = std::collections::BTreeMap::<_, usize>::new();
-    report.valid = selvedge::validate(bytes, dictionary, limits, &mut |finding: Finding| {
-        if report.count == 0 {
-            report.exit_code = crate::error::exit_code_of(finding.rule);
-        }
-        report.count += 1;
-        let of_rule = kept.entry(finding.rule).or_default();
-        *of_rule += 1;
-        if *of_rule <= KEPT {
-            report.findings.push(finding.into());
-        }
-        true
-    });
-    report
-}
-
-/// The same for people: a line a finding, nothing where all is well.
-pub fn validation_text(report: &Validation) -> String {
-    let mut text = String::new();
-    for f in &report.findings {
-        let part = if f.part == "dictionary" { " (dictionary)" } else { "" };
-        text += &format!("{}{part}: {} at byte {}: {}; found {} ({:#x})\n", report.file, f.rule, f.offset, f.title, f.found, f.found);
-    }
-    if report.count > report.findings.len() {
-        text += &format!("{}: {} findings in all\n", report.file, report.count);
-    }
-    text
 }
 
 /// A section, as JSON.

@@ -14,7 +14,8 @@
 //! | [`read`], [`trim`](mod@trim), [`sector`] | a file becomes a model again, and a smaller one |
 //! | [`blend`](mod@blend), [`basis`] | a material between two |
 //! | [`story`], [`progress`] | the encoder's part of the demo; a line on a terminal |
-//! | [`inspect`], [`picture`], [`demo`] | what `info`, `validate`, `decode` and `demo` show |
+//! | [`validate`](mod@validate) | every finding of a file, in words |
+//! | [`inspect`], [`explain`](mod@explain), [`picture`], [`demo`] | what `info`, `explain`, `decode` and `demo` show |
 //! | [`kernel`], [`gpu`] | the kernel for other renderers, and run here |
 //! | [`example`], [`extreme`], [`random`] | files that the specification and the tests use |
 //! | [`vectors`], [`conform`] | the conformance suite, made of recipes; decoders held against it |
@@ -34,6 +35,7 @@ pub mod directions;
 pub mod encode;
 pub mod error;
 pub mod example;
+pub mod explain;
 pub mod extreme;
 pub mod files;
 pub mod folder;
@@ -58,5 +60,6 @@ pub mod train;
 pub mod transfer;
 pub mod triangulate;
 pub mod trim;
+pub mod validate;
 pub mod vectors;
 pub mod write;

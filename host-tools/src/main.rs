@@ -8,7 +8,7 @@ use clap::{Args, Parser, Subcommand};
 use selvedge::header::CONTENT_DICTIONARY;
 use selvedge::{Direction, Limits};
 use selvedge_tools::error::{Result, ToolError};
-use selvedge_tools::{conform, demo, files, inspect, kernel, sparsebtf, vectors, write};
+use selvedge_tools::{conform, demo, explain, files, inspect, kernel, sparsebtf, validate, vectors, write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -61,17 +61,52 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// Check files against every rule of the specification; silent when good
+    /// Check files against every rule of the specification, and for what is unwise; silent when good
     Validate {
-        /// Files, - for standard input
-        #[arg(required = true)]
+        /// Files, folders with .selv files, - for standard input
+        #[arg(required_unless_present_any = ["rules", "schema"])]
         files: Vec<PathBuf>,
         /// The external dictionary of the files
         #[arg(long)]
         dictionary: Option<PathBuf>,
         #[command(flatten)]
         limits: LimitArgs,
-        /// As JSON
+        /// How findings are told
+        #[arg(long, value_enum, default_value_t = Format::Text)]
+        format: Format,
+        /// The same as --format json
+        #[arg(long, conflicts_with = "format")]
+        json: bool,
+        /// Warnings make a file fail
+        #[arg(long)]
+        warnings_as_errors: bool,
+        /// Another severity, as W1=off or 3.2-5=warning: off, note, warning, error
+        #[arg(long = "severity", value_name = "RULE=SEVERITY", value_parser = parse_severity)]
+        severities: Vec<(String, validate::Severity)>,
+        /// List all rules that are checked, and stop
+        #[arg(long)]
+        rules: bool,
+        /// Print the JSON schema of --format json, and stop
+        #[arg(long)]
+        schema: bool,
+    },
+    /// Say which block, dictionary and atoms made the sample of a texel, and what each gave
+    Explain {
+        #[command(flatten)]
+        source: Source,
+        /// The texel, as 10,20
+        #[arg(long, value_parser = parse_texel)]
+        texel: [u32; 2],
+        /// Light: angle from the normal and azimuth, degrees
+        #[arg(long, default_value = "30,0", value_parser = parse_angles, allow_hyphen_values = true)]
+        light: Direction,
+        /// View: angle from the normal and azimuth, degrees
+        #[arg(long, default_value = "0,0", value_parser = parse_angles, allow_hyphen_values = true)]
+        view: Direction,
+        /// Coefficients that are listed of a record
+        #[arg(long, default_value_t = 8)]
+        most: usize,
+        /// As JSON, with all coefficients
         #[arg(long)]
         json: bool,
     },
@@ -115,6 +150,17 @@ enum Command {
         #[arg(long)]
         out: Option<PathBuf>,
     },
+}
+
+/// How findings are told.
+#[derive(Clone, Copy, clap::ValueEnum, PartialEq)]
+enum Format {
+    /// A line a finding
+    Text,
+    /// By the published schema
+    Json,
+    /// SARIF 2.1.0, for code hosts and editors
+    Sarif,
 }
 
 /// A material and its dictionary.
@@ -165,6 +211,16 @@ fn parse_angles(text: &str) -> std::result::Result<Direction, String> {
     Ok(Direction::from_unit_vector([(polar.sin() * azimuth.cos()) as f32, (polar.sin() * azimuth.sin()) as f32, polar.cos() as f32]))
 }
 
+fn parse_texel(text: &str) -> std::result::Result<[u32; 2], String> {
+    let parts: Option<Vec<u32>> = text.split(',').map(|n| n.trim().parse().ok()).collect();
+    parts.and_then(|parts| parts.try_into().ok()).ok_or_else(|| "two numbers, as 10,20".into())
+}
+
+fn parse_severity(text: &str) -> std::result::Result<(String, validate::Severity), String> {
+    let (rule, severity) = text.split_once('=').ok_or("a rule and a severity, as W1=off")?;
+    Ok((rule.into(), severity.parse()?))
+}
+
 fn parse_exposure(text: &str) -> std::result::Result<f32, String> {
     text.parse().ok().filter(|f: &f32| f.is_finite() && *f > 0.0).ok_or_else(|| "a positive number".into())
 }
@@ -213,31 +269,37 @@ fn import(folder: &Path, material: Option<String>, blocks: Option<[usize; 2]>, v
 }
 
 /// Tells what is found in each file; the exit code is that of the first that is not good.
-fn validate(paths: &[PathBuf], dictionary: Option<&Path>, limits: &Limits, json: bool) -> Result<u8> {
+fn check_files(paths: &[PathBuf], dictionary: Option<&Path>, options: &validate::Options, format: Format) -> Result<u8> {
+    options.check()?;
     let dictionary = dictionary.map(files::read).transpose()?;
     let mut reports = Vec::new();
     let mut code = 0;
-    for path in paths {
-        let bytes = match files::read(path) {
-            Ok(bytes) => bytes,
-            Err(error) => {
-                eprintln!("selvedge: {error}");
-                code = if code == 0 { error.exit_code() } else { code };
-                continue;
-            }
-        };
-        let own = dictionary.as_deref().filter(|_| !inspect::is_dictionary(&bytes));
-        let report = inspect::validate(&path.display().to_string(), &bytes, own, limits);
+    let paths = validate::files_of(paths)?;
+    validate::validate_files(&paths, dictionary.as_deref(), options, &mut |report| {
         code = if code == 0 { report.exit_code } else { code };
-        if !json {
-            print(&inspect::validation_text(&report))?;
+        if let Some(why) = &report.unreadable {
+            eprintln!("selvedge: {why}");
+        }
+        if format == Format::Text {
+            return print(&validate::text(&report));
         }
         reports.push(report);
-    }
-    if json {
-        print_json(&reports)?;
+        Ok(())
+    })?;
+    match format {
+        Format::Text => {}
+        Format::Json => print_json(&validate::Reports { format: "selvedge-validation-1", version: env!("CARGO_PKG_VERSION"), files: reports })?,
+        Format::Sarif => print_json(&validate::sarif(&reports))?,
     }
     Ok(code)
+}
+
+/// Every rule and advice: number, name, usual severity, what it asks for.
+fn list_rules() -> Result<u8> {
+    let rules = selvedge::Rule::ALL.iter().map(|rule| format!("{}\t{}\terror\t{}\n", rule.id(), rule.name(), rule.title()));
+    let advice = validate::ADVICE.iter().map(|advice| format!("{}\t{}\twarning\t{}\n", advice.id, advice.name, advice.expected));
+    print(&rules.chain(advice).collect::<String>())?;
+    Ok(0)
 }
 
 /// Tells every vector that is answered otherwise than its suite states.
@@ -273,7 +335,25 @@ fn run(cli: Cli) -> Result<u8> {
             }
             Ok(0)
         }),
-        Command::Validate { files, dictionary, limits, json } => validate(&files, dictionary.as_deref(), &limits.limits(), json),
+        Command::Validate { rules: true, .. } => list_rules(),
+        Command::Validate { schema: true, .. } => print(&validate::schema()).map(|()| 0),
+        Command::Validate { files, dictionary, limits, format, json, warnings_as_errors, severities, .. } => {
+            let options = validate::Options { limits: limits.limits(), warnings_as_errors, severities: severities.into_iter().collect() };
+            check_files(&files, dictionary.as_deref(), &options, if json { Format::Json } else { format })
+        }
+        Command::Explain { source, texel, light, view, most, json } => with_material(&source, |material| {
+            let size = material.image_size(0);
+            if texel[0] >= size[0] || texel[1] >= size[1] {
+                return Err(ToolError::Usage(format!("--texel: the image has {} x {} texels", size[0], size[1])));
+            }
+            let explanation = explain::explain(&material, texel, light, view);
+            if json {
+                print_json(&explanation)?
+            } else {
+                print(&explain::text(&explanation, most))?
+            }
+            Ok(0)
+        }),
         Command::Conform { folder, make, program } => conform(&folder, make, &program),
         Command::Decode { source, output, light, view, level, layers, exposure } => with_material(&source, |material| {
             let header = material.header();

@@ -159,23 +159,26 @@ fn record(words: Words<'_>, record: Record) -> RecordModel {
     if record.count == 0 {
         return RecordModel::default();
     }
+    let mut coefficients = Vec::with_capacity(record.count as usize);
+    record_coefficients(words, record, |position, value| coefficients.push((position, value as u16)));
+    RecordModel { dictionary: record.dictionary, shift: record.shift, coefficients }
+}
+
+/// Position and value of each coefficient of a record that has some.
+pub(crate) fn record_coefficients(words: Words<'_>, record: Record, mut each: impl FnMut(u32, u32)) {
     let field_bits = record.low_bits + record.value_bits;
     let (mut bit, mut high) = (record.highs_bit, 0);
-    let coefficients = (0..record.count)
-        .map(|index| {
-            let mut window = bit_window(words, record.stream, bit);
-            while window == 0 && high < 65_536 {
-                high += 32;
-                bit += 32;
-                window = bit_window(words, record.stream, bit);
-            }
-            let zeros = window.trailing_zeros() & 31;
-            high += zeros;
-            bit += zeros + 1;
-            let field = bit_window(words, record.stream, record.fields_bit + index * field_bits);
-            let position = high << record.low_bits | low_part(field, record.low_bits);
-            (position, low_part(field >> record.low_bits, record.value_bits) as u16)
-        })
-        .collect();
-    RecordModel { dictionary: record.dictionary, shift: record.shift, coefficients }
+    for index in 0..record.count {
+        let mut window = bit_window(words, record.stream, bit);
+        while window == 0 && high < 65_536 {
+            high += 32;
+            bit += 32;
+            window = bit_window(words, record.stream, bit);
+        }
+        let zeros = window.trailing_zeros() & 31;
+        high += zeros;
+        bit += zeros + 1;
+        let field = bit_window(words, record.stream, record.fields_bit + index * field_bits);
+        each(high << record.low_bits | low_part(field, record.low_bits), low_part(field >> record.low_bits, record.value_bits));
+    }
 }

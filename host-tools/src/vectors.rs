@@ -235,7 +235,7 @@ impl Edit {
 
     fn apply(&self, file: &mut Vec<u8>, made: &BTreeMap<String, Vector>) -> Result<()> {
         let outside = || ToolError::Usage(format!("{self:?} lies outside the file"));
-        let (section, edit): (&str, Box<dyn Fn(&mut Vec<u8>) -> Option<()> + '_>) = match self {
+        match self {
             Edit::Set { set, to, width } => {
                 let (at, width, value) = (place(file, set)?, width.unwrap_or(4), to.get()?.to_le_bytes());
                 let slot = file.get_mut(at..at + width).ok_or_else(outside)?;
@@ -244,68 +244,85 @@ impl Edit {
                     return Err(ToolError::Usage(format!("{self:?} changes nothing")));
                 }
                 slot.copy_from_slice(new);
-                return Ok(());
             }
             Edit::Flip { flip, bits } => {
                 let at = place(file, flip)?;
                 *file.get_mut(at).ok_or_else(outside)? ^= bits;
-                return Ok(());
             }
-            Edit::Cut { cut } => {
-                file.truncate(*cut);
-                return Ok(());
-            }
-            Edit::Extend { extend } => {
-                file.resize(file.len() + extend, 0);
-                return Ok(());
-            }
+            Edit::Cut { cut } => file.truncate(*cut),
+            Edit::Extend { extend } => file.resize(file.len() + extend, 0),
             Edit::Remove { remove } => {
                 let key = section_key(remove)?;
-                let (header, mut parts) = take_apart(file);
-                parts.retain(|part| (part.kind, part.instance) != key);
-                *file = lay_out(header, parts);
-                return Ok(());
+                with_parts(file, |parts| parts.retain(|part| (part.kind, part.instance) != key));
             }
             Edit::Add { add, words } => {
-                let (kind, instance) = section_key(add)?;
-                let (header, mut parts) = take_apart(file);
-                parts.push(Part { kind, instance, bytes: words_of(words)? });
-                *file = lay_out(header, parts);
-                return Ok(());
+                let ((kind, instance), bytes) = (section_key(add)?, words_of(words)?);
+                with_parts(file, |parts| parts.push(Part { kind, instance, bytes }));
             }
-            Edit::Words { section, words } => {
-                let new = words_of(words)?;
-                (section, Box::new(move |bytes| Some(bytes.clone_from(&new))))
+            Edit::Words { section, words } => *section_of(file, section)? = words_of(words)?,
+            Edit::Append { section, append } => section_of(file, section)?.extend(words_of(append)?),
+            Edit::Drop { section, drop } => {
+                let mut bytes = section_of(file, section)?;
+                let left = bytes.len().checked_sub(*drop).ok_or_else(outside)?;
+                bytes.truncate(left);
             }
-            Edit::Append { section, append } => {
-                let more = words_of(append)?;
-                (section, Box::new(move |bytes| Some(bytes.extend(&more))))
-            }
-            Edit::Drop { section, drop } => (section, Box::new(|bytes| Some(bytes.truncate(bytes.len().checked_sub(*drop)?)))),
-            Edit::Rotate { section, rotate: [from, to, by] } => (section, Box::new(|bytes| bytes.get_mut(*from..*to).map(|part| part.rotate_left(*by)))),
-            Edit::Byte { section, byte, to } => (section, Box::new(|bytes| bytes.get_mut(*byte).map(|slot| *slot = *to))),
+            Edit::Rotate { section, rotate: [from, to, by] } => section_of(file, section)?.get_mut(*from..*to).ok_or_else(outside)?.rotate_left(*by),
+            Edit::Byte { section, byte, to } => *section_of(file, section)?.get_mut(*byte).ok_or_else(outside)? = *to,
             Edit::Directions { directions, points, triangles, hull, grid } => {
                 let own = triangulate(points, None);
                 let t = with_grid(points, triangles.clone().unwrap_or(own.triangles), hull.clone().unwrap_or(own.hull), *grid);
-                let part = directions_part(*directions, points, &t);
-                let (header, mut parts) = take_apart(file);
-                let slot = parts.iter_mut().find(|p| (p.kind, p.instance) == (part.kind, part.instance)).ok_or_else(outside)?;
-                *slot = part;
-                *file = lay_out(header, parts);
-                return Ok(());
+                *section_of(file, &format!("0003.{directions:04x}"))? = directions_part(*directions, points, &t).bytes;
             }
             Edit::Reference { reference } => {
                 let other = made.get(reference).ok_or_else(|| ToolError::Usage(format!("{reference}: no recipe before this one has the name")))?;
                 let words = words_to_bytes(&[other.bytes.len() as u32, 0, 0, 0]);
-                ("0002.0000", Box::new(move |bytes| Some(*bytes = [&selvedge::sha256(&other.bytes)[..], &words].concat())))
+                *section_of(file, "0002.0000")? = [&selvedge::sha256(&other.bytes)[..], &words].concat();
             }
-        };
-        let key = section_key(section)?;
-        let (header, mut parts) = take_apart(file);
-        let part = parts.iter_mut().find(|part| (part.kind, part.instance) == key).ok_or_else(outside)?;
-        edit(&mut part.bytes).ok_or_else(outside)?;
-        *file = lay_out(header, parts);
+        }
         Ok(())
+    }
+}
+
+/// Changes the sections of a file and lays it out again.
+fn with_parts(file: &mut Vec<u8>, change: impl FnOnce(&mut Vec<Part>)) {
+    let (header, mut parts) = take_apart(file);
+    change(&mut parts);
+    *file = lay_out(header, parts);
+}
+
+/// The bytes of a section; the file is laid out again when they are let go.
+struct SectionBytes<'a> {
+    file: &'a mut Vec<u8>,
+    header: [u32; 32],
+    parts: Vec<Part>,
+    at: usize,
+}
+
+fn section_of<'a>(file: &'a mut Vec<u8>, section: &str) -> Result<SectionBytes<'a>> {
+    let key = section_key(section)?;
+    let (header, parts) = take_apart(file);
+    let at = parts.iter().position(|part| (part.kind, part.instance) == key);
+    let at = at.ok_or_else(|| ToolError::Usage(format!("the file has no section {section}")))?;
+    Ok(SectionBytes { file, header, parts, at })
+}
+
+impl std::ops::Deref for SectionBytes<'_> {
+    type Target = Vec<u8>;
+
+    fn deref(&self) -> &Vec<u8> {
+        &self.parts[self.at].bytes
+    }
+}
+
+impl std::ops::DerefMut for SectionBytes<'_> {
+    fn deref_mut(&mut self) -> &mut Vec<u8> {
+        &mut self.parts[self.at].bytes
+    }
+}
+
+impl Drop for SectionBytes<'_> {
+    fn drop(&mut self) {
+        *self.file = lay_out(self.header, std::mem::take(&mut self.parts));
     }
 }
 

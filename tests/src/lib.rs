@@ -20,3 +20,15 @@ pub fn full_data_folder(what_is_skipped: &str) -> Option<PathBuf> {
 pub fn setting(name: &str, default: usize) -> usize {
     std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
 }
+
+/// The program, built beside these tests.
+pub fn program() -> PathBuf {
+    let mut folder = std::env::current_exe().expect("a test has a path");
+    folder.pop();
+    if folder.ends_with("deps") {
+        folder.pop();
+    }
+    let path = folder.join(format!("selvedge{}", std::env::consts::EXE_SUFFIX));
+    assert!(path.exists(), "{} is built by `cargo build --workspace`", path.display());
+    path
+}

@@ -1,20 +1,8 @@
 //! The program as a user meets it: exit codes, silence, whole files.
 
-use selvedge_tests::excerpt_folder;
-use std::path::{Path, PathBuf};
+use selvedge_tests::{excerpt_folder, program};
+use std::path::Path;
 use std::process::{Command, Output};
-
-/// The program, built beside these tests.
-fn program() -> PathBuf {
-    let mut folder = std::env::current_exe().expect("a test has a path");
-    folder.pop();
-    if folder.ends_with("deps") {
-        folder.pop();
-    }
-    let path = folder.join(format!("selvedge{}", std::env::consts::EXE_SUFFIX));
-    assert!(path.exists(), "{} is built by `cargo build --workspace`", path.display());
-    path
-}
 
 fn run(arguments: &[&str]) -> Output {
     Command::new(program()).args(arguments).output().expect("the program runs")
@@ -84,8 +72,8 @@ fn exit_codes_tell_the_families_apart() {
     assert_eq!(code(&["validate", text(&write("newer", &newer))]), 5);
     let found = run(&["validate", "--json", text(&folder.path().join("damaged"))]);
     let report: serde_json::Value = serde_json::from_slice(&found.stdout).expect("JSON");
-    assert_eq!(report[0]["valid"], false);
-    assert_eq!(report[0]["findings"][0]["rule"], "3.2-7");
+    assert_eq!(report["files"][0]["valid"], false);
+    assert_eq!(report["files"][0]["findings"][0]["rule"], "3.2-7");
 }
 
 /// A failure leaves the old file as it was and nothing beside it.
