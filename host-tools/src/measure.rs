@@ -12,6 +12,8 @@ use selvedge::direction_set::cosine_of;
 use selvedge::{Direction, Rgb, Selvedge};
 use serde::Serialize;
 use std::f64::consts::LN_2;
+use std::iter::StepBy;
+use std::ops::Range;
 
 /// One material to be compared: radiance at texels and pairs of directions.
 #[derive(Clone, Copy)]
@@ -100,7 +102,7 @@ pub fn log_offset(file: &Selvedge<'_>) -> f32 {
     let description = describe(file);
     let mut images_at = Vec::new();
     let mut statistics = Statistics::default();
-    if images(Source::File(file, 0), &description, 0, 0..description.lights.len(), &mut images_at).is_ok() {
+    if images(Source::File(file, 0), &description, 0, (0..description.lights.len()).step_by(1), &mut images_at).is_ok() {
         let count = images_at.len().max(1) as f64;
         statistics.mean = std::array::from_fn(|c| images_at.iter().map(|rgb| rgb[c] as f64).sum::<f64>() / count);
     }
@@ -119,28 +121,34 @@ pub fn nearest(set: &[glam::DVec3], asked: Direction) -> usize {
 /// The image of one pair of a reference's directions, row by row.
 pub fn image(source: Source<'_>, description: &Description, light: usize, view: usize) -> Result<Vec<[f32; 3]>> {
     let mut out = Vec::new();
-    images(source, description, view, light..light + 1, &mut out)?;
+    images(source, description, view, (light..light + 1).step_by(1), &mut out)?;
     Ok(out)
 }
 
-/// Radiance of a source at one view and a range of lights: `[light][texel]`.
-fn images(source: Source<'_>, description: &Description, view: usize, lights: std::ops::Range<usize>, out: &mut Vec<[f32; 3]>) -> Result<()> {
+/// Radiance of a source at one view and some lights: `[light][texel]`.
+fn images(source: Source<'_>, description: &Description, view: usize, lights: StepBy<Range<usize>>, out: &mut Vec<[f32; 3]>) -> Result<()> {
     let texels = description.texels();
-    out.resize(texels * lights.len(), [0.0; 3]);
+    let numbers: Vec<usize> = lights.collect();
+    let (Some(&first), Some(&last)) = (numbers.first(), numbers.last()) else {
+        out.clear();
+        return Ok(());
+    };
+    out.resize(texels * numbers.len(), [0.0; 3]);
     match source {
         Source::Data(dataset) => {
             let mut bytes = Vec::new();
-            let mut run = vec![0.0; lights.len() * 3];
+            let mut run = vec![0.0; (last + 1 - first) * 3];
             for texel in 0..texels {
-                dataset.read_pairs(texel, view * description.lights.len() + lights.start, &mut bytes, &mut run)?;
-                run.as_chunks::<3>().0.iter().enumerate().for_each(|(i, rgb)| out[i * texels + texel] = *rgb);
+                dataset.read_pairs(texel, view * description.lights.len() + first, &mut bytes, &mut run)?;
+                let rgb = &run.as_chunks::<3>().0;
+                numbers.iter().enumerate().for_each(|(i, light)| out[i * texels + texel] = rgb[light - first]);
             }
         }
         Source::File(file, level) => {
             let mut scratch = vec![0; file.image_scratch_len()];
             let mut image = vec![Rgb::default(); texels];
             let view = query(description.views[view]);
-            for (i, light) in lights.enumerate() {
+            for (i, light) in numbers.into_iter().enumerate() {
                 let light = query(description.lights[light]);
                 file.decode_image(level, light, view, &mut scratch, &mut image).expect("the buffers are as long as asked for");
                 out[i * texels..][..texels].iter_mut().zip(&image).for_each(|(out, rgb)| *out = rgb.to_f32());
@@ -157,6 +165,19 @@ fn images(source: Source<'_>, description: &Description, view: usize, lights: st
 /// # Errors
 /// If the sizes differ or data cannot be read.
 pub fn compare(
+    reference: Source<'_>,
+    other: Source<'_>,
+    description: &Description,
+    log_offset: f32,
+    peak: Option<f64>,
+    progress: &dyn Fn(usize, usize),
+) -> Result<Metrics> {
+    compare_every(1, reference, other, description, log_offset, peak, progress)
+}
+
+/// As [`compare`], over every so many-th light of each view; the first of them moves from view to view.
+pub fn compare_every(
+    every: usize,
     reference: Source<'_>,
     other: Source<'_>,
     description: &Description,
@@ -186,7 +207,9 @@ pub fn compare(
     let parts = description.views.len() * chunks;
     let work = |part: usize| -> Result<(Sums, f32)> {
         let (view, first) = (part / chunks, part % chunks * at_once);
-        let range = first..(first + at_once).min(lights);
+        // A step that shares no factor with most counts of lights, so that all lights have their turn.
+        let start = (view * 7 + first).next_multiple_of(every) - view * 7;
+        let range = (start..(first + at_once).min(lights)).step_by(every);
         let (mut a, mut b) = (Vec::new(), Vec::new());
         images(reference, description, view, range.clone(), &mut a)?;
         images(other, description, view, range, &mut b)?;
@@ -205,7 +228,7 @@ pub fn compare(
                 if difference.abs() > sums.largest.difference || difference.is_nan() {
                     let texel = i % texels;
                     let place = [texel % description.size[0], texel / description.size[0]];
-                    sums.largest = Place { difference: difference.abs(), texel: place, light: first + i / texels, view };
+                    sums.largest = Place { difference: difference.abs(), texel: place, light: start + i / texels * every, view };
                 }
             }
         }

@@ -6,7 +6,7 @@
 use super::{Encoded, Goal, Options, Prepared, encode};
 use crate::dictionary::Ensemble;
 use crate::error::{Result, ToolError};
-use crate::measure::{Metrics, Source, compare};
+use crate::measure::{Metrics, Source, compare_every};
 use crate::model::TransferModel;
 use selvedge::Limits;
 
@@ -98,15 +98,16 @@ fn measured(wish: Wish, metrics: &Metrics) -> Option<(f64, f64)> {
 
 fn meet(prepared: &Prepared<'_>, ensembles: &[Ensemble; 3], wish: Wish, options: &Options, tell: &(dyn Fn(Event<'_>) + Sync)) -> Result<Verified> {
     let edge = options.edge;
-    let attempt = |goal: Goal| -> Result<Verified> {
+    let attempt = |goal: Goal, sampled: bool| -> Result<(Verified, bool)> {
         let encoded = encode(prepared, ensembles, &Options { goal, ..options.clone() }, &|done, all| tell(Event::Pass("projecting", done, all)))?;
-        let (metrics, operations) = verify(prepared, &encoded, options, tell)?;
+        let every = if sampled { sampling(prepared, &encoded) } else { 1 };
+        let (metrics, operations) = verify(prepared, &encoded, every, options, tell)?;
         tell(Event::Attempt(edge, &encoded, &metrics));
-        Ok(Verified { encoded, edge, metrics, operations })
+        Ok((Verified { encoded, edge, metrics, operations }, every > 1))
     };
     match wish {
-        Wish::Size(bytes) => return attempt(Goal::Size(bytes)),
-        Wish::Coefficients(counts) => return attempt(Goal::Coefficients(counts)),
+        Wish::Size(bytes) => return Ok(attempt(Goal::Size(bytes), false)?.0),
+        Wish::Coefficients(counts) => return Ok(attempt(Goal::Coefficients(counts), false)?.0),
         Wish::LogRms(_) | Wish::LinearRms(_) | Wish::Psnr(_) => {}
     }
     // In the domain of the channels the prediction is near; in the other the way goes by ratios.
@@ -125,10 +126,16 @@ fn meet(prepared: &Prepared<'_>, ensembles: &[Ensemble; 3], wish: Wish, options:
     };
     let mut best: Option<Verified> = None;
     for _ in 0..8 {
-        let verified = attempt(Goal::Rms(goal))?;
-        let Some((found, most)) = measured(wish, &verified.metrics) else { return Ok(verified) };
+        let (mut verified, sampled) = attempt(Goal::Rms(goal), true)?;
+        let Some((mut found, most)) = measured(wish, &verified.metrics) else { return Ok(verified) };
+        let worth_it = best.as_ref().is_none_or(|best| verified.encoded.bytes.len() < best.encoded.bytes.len());
+        // A sample can only refuse: what is kept was decoded as a whole.
+        if sampled && found <= most && worth_it {
+            (verified.metrics, verified.operations) = verify(prepared, &verified.encoded, 1, options, tell)?;
+            found = measured(wish, &verified.metrics).map_or(found, |(found, _)| found);
+        }
         let (reached, near) = (found <= most, found > most * 0.97);
-        if reached && best.as_ref().is_none_or(|best| verified.encoded.bytes.len() < best.encoded.bytes.len()) {
+        if reached && worth_it {
             best = Some(verified);
         }
         if reached && near || found <= 0.0 {
@@ -143,13 +150,23 @@ fn meet(prepared: &Prepared<'_>, ensembles: &[Ensemble; 3], wish: Wish, options:
     best.ok_or_else(|| ToolError::Usage("this error cannot be reached".into()))
 }
 
-/// Decodes a file at every texel and pair of level 0.
-fn verify(prepared: &Prepared<'_>, encoded: &Encoded, options: &Options, tell: &(dyn Fn(Event<'_>) + Sync)) -> Result<(Metrics, u32)> {
+/// Coefficients times images that a verification may cost while a goal is still looked for.
+const TRIAL: u64 = 4_000_000_000;
+
+/// Of how many lights one is decoded while a goal is still looked for.
+fn sampling(prepared: &Prepared<'_>, encoded: &Encoded) -> usize {
+    let coefficients: usize = encoded.coefficients.iter().sum();
+    (coefficients as u64 * prepared.levels[0].description().pairs() as u64 / TRIAL).clamp(1, 16) as usize
+}
+
+/// Decodes a file at every texel of level 0 and every so many-th light.
+fn verify(prepared: &Prepared<'_>, encoded: &Encoded, every: usize, options: &Options, tell: &(dyn Fn(Event<'_>) + Sync)) -> Result<(Metrics, u32)> {
     let opened = selvedge::open_with(&encoded.bytes, options.external.as_deref(), &Limits::NONE);
     let file = opened.map_err(|finding| ToolError::Mismatch(format!("the encoder wrote a file that breaks a rule: {finding}")))?;
     let data = prepared.levels[0];
     let offset = data.statistics().log_offset();
     let progress = |done, all| tell(Event::Pass("verifying", done, all));
-    let metrics = compare(Source::Data(data), Source::File(&file, 0), data.description(), offset, None, &progress)?;
+    let peak = Some(data.statistics().largest as f64);
+    let metrics = compare_every(every, Source::Data(data), Source::File(&file, 0), data.description(), offset, peak, &progress)?;
     Ok((metrics, file.header().operations))
 }

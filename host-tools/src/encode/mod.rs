@@ -19,6 +19,7 @@ use crate::transfer::Forward;
 use crate::write::{write_material, write_with_dictionary};
 use assemble::{MeanTable, Setting, mean_tables};
 use candidates::{Candidates, Keep, collect};
+use rayon::prelude::*;
 use select::{Channel, Selection};
 use selvedge::cost::record_operations;
 use std::f64::consts::LN_2;
@@ -264,7 +265,13 @@ impl<'a> Search<'a> {
     /// The smallest file of at most this error, or `None` if all candidates leave a larger one.
     fn for_rms(&self, least: f64, rms: f64) -> Result<Option<Encoded>> {
         let goal = (rms / self.prepared.unit()).powi(2) * self.prepared.values(self.options.edge);
-        let lost = |threshold: f64| -> Result<f64> { Ok(self.select(threshold)?.iter().map(|s| s.lost_at_0).sum()) };
+        let lost = |threshold: f64| -> Result<f64> {
+            if self.options.operations.is_none() {
+                let of: Vec<f64> = self.channels.par_iter().map(|channel| channel.lost_at_0(threshold as f32, COEFFICIENT_BITS)).collect();
+                return Ok(of.iter().sum());
+            }
+            Ok(self.select(threshold)?.iter().map(|s| s.lost_at_0).sum())
+        };
         // Share of the error that rounding of values makes; learnt from the file before.
         let mut rounding = 0.2;
         let mut best: Option<Encoded> = None;

@@ -39,18 +39,21 @@ pub struct Channel<'a> {
 impl<'a> Channel<'a> {
     /// Numbers the atoms.
     pub fn new(levels: Vec<&'a Candidates>, ensemble: &Ensemble) -> Channel<'a> {
-        let key_of = |candidates: &Candidates, block: usize, i: usize| (candidates.dictionaries[block], candidates.places[i]);
+        let size = ensemble.light.columns * ensemble.view.columns * ensemble.edge() * ensemble.edge();
+        let bit_of = |candidates: &Candidates, block: usize, i: usize| candidates.dictionaries[block] as usize * size + candidates.places[i] as usize;
         let all = |candidates: &'a Candidates| {
-            (0..candidates.dictionaries.len()).flat_map(move |b| (candidates.starts[b]..candidates.starts[b + 1]).map(move |i| key_of(candidates, b, i)))
+            (0..candidates.dictionaries.len()).flat_map(move |b| (candidates.starts[b]..candidates.starts[b + 1]).map(move |i| bit_of(candidates, b, i)))
         };
+        // A bit for every atom that there could be; the number of one is that of the bits before it.
+        let mut bits = vec![0u64; (size * ensemble.turns.len()).div_ceil(64)];
+        levels.iter().flat_map(|candidates| all(candidates)).for_each(|bit| bits[bit / 64] |= 1 << (bit % 64));
+        let mut before = Vec::with_capacity(bits.len());
         let mut keys: Vec<(u16, u32)> = Vec::new();
-        for candidates in &levels {
-            keys.extend(all(candidates));
-            // In between, so that the list stays short.
-            keys.sort_unstable();
-            keys.dedup();
+        for (i, &word) in bits.iter().enumerate() {
+            before.push(keys.len() as u32);
+            keys.extend((0..64).filter(|n| word >> n & 1 == 1).map(|n| i * 64 + n).map(|bit| ((bit / size) as u16, (bit % size) as u32)));
         }
-        let number = |key: (u16, u32)| keys.partition_point(|&k| k < key) as u32;
+        let number = |bit: usize| before[bit / 64] + (bits[bit / 64] & ((1 << (bit % 64)) - 1)).count_ones();
         let atoms = levels.iter().map(|candidates| all(candidates).map(number).collect()).collect();
         Channel {
             levels,
@@ -64,6 +67,20 @@ impl<'a> Channel<'a> {
 
     /// Chooses at a threshold; `bits` is what a coefficient costs, `most` the largest record that is allowed.
     pub fn select(&self, threshold: f32, bits: f64, most: usize) -> Selection {
+        let alive = self.paying(threshold, bits);
+        self.keep(|value, atom| value.abs() >= threshold && alive[atom], most)
+    }
+
+    /// The energy of level 0 that [`Channel::select`] loses without a limit on records, without its lists.
+    pub fn lost_at_0(&self, threshold: f32, bits: f64) -> f64 {
+        let alive = self.paying(threshold, bits);
+        let (Some(candidates), Some(atoms)) = (self.levels.first(), self.atoms.first()) else { return 0.0 };
+        let kept = candidates.values.iter().zip(atoms).filter(|(value, atom)| value.abs() >= threshold && alive[**atom as usize]);
+        (candidates.energy - kept.map(|(&value, _)| (value as f64).powi(2)).sum::<f64>()).max(0.0)
+    }
+
+    /// The atoms that pay for themselves at a threshold.
+    fn paying(&self, threshold: f32, bits: f64) -> Vec<bool> {
         let square = (threshold as f64).powi(2);
         let price = square / bits;
         let mut gains = vec![0.0f64; self.keys.len()];
@@ -102,7 +119,7 @@ impl<'a> Channel<'a> {
             }
         }
         self.limit_atoms(&gains, &mut alive);
-        self.keep(|value, atom| value.abs() >= threshold && alive[atom], most)
+        alive
     }
 
     /// Every candidate, within the largest record that is allowed.
