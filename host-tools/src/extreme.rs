@@ -15,8 +15,13 @@ use std::collections::BTreeSet;
 
 /// A legal material by its seed.
 pub fn extreme_model(seed: u64) -> MaterialModel {
-    let mut random = Random::new(seed);
-    let r = &mut random;
+    let mut model = extreme_model_from(&mut Random::new(seed));
+    model.metadata.texts[0] = format!("seed {seed}");
+    model
+}
+
+/// A legal material by random numbers.
+pub fn extreme_model_from(r: &mut Random) -> MaterialModel {
     let any_size = r.range(2, 40) as u32;
     let size = [r.pick(&[any_size, any_size, 1, 2, 17]), r.pick(&[any_size / 2 + 1, any_size, 1, 3, 33])];
     let edge = r.range(1, 16) as u32;
@@ -53,7 +58,7 @@ pub fn extreme_model(seed: u64) -> MaterialModel {
             frame: r.range(0, 2) as u32,
             image_origin: r.range(0, 2) as u32,
             primaries: r.range(0, 4) as u32,
-            texts: [format!("seed {seed}"), "\u{10ffff}\u{e9}".repeat(r.range(0, 5) as usize), String::new()],
+            texts: [String::new(), "\u{10ffff}\u{e9}".repeat(r.range(0, 5) as usize), String::new()],
         },
         lights,
         views,

@@ -20,12 +20,14 @@
 //! | [`example`], [`extreme`], [`random`] | files that the specification and the tests use |
 //! | [`vectors`], [`conform`] | the conformance suite, made of recipes; decoders held against it |
 //! | [`baseline`] | what the encoder is measured against |
+//! | [`cli`] | the program |
 //! | [`files`], [`error`] | whole writes, exit codes |
 
 pub mod baseline;
 pub mod basis;
 pub mod blend;
 pub mod blocks;
+pub mod cli;
 pub mod conform;
 pub mod dataset;
 pub mod demo;

@@ -2,18 +2,28 @@
 
 /// A generator; equal seeds give equal sequences everywhere.
 #[derive(Clone, Debug)]
-pub struct Random(u64);
+pub struct Random {
+    state: u64,
+    /// Words that are given before those of the generator, last first.
+    given: Vec<u32>,
+}
 
 impl Random {
     /// From a seed.
     pub fn new(seed: u64) -> Random {
-        Random(seed ^ 0x5e1f_ed9e_0000_0000)
+        Random { state: seed ^ 0x5e1f_ed9e_0000_0000, given: Vec::new() }
+    }
+
+    /// From any bytes: they are the first random numbers, four bytes each, so that whoever chooses them chooses what is made.
+    pub fn from_bytes(bytes: &[u8]) -> Random {
+        let given = bytes.rchunks(4).map(|word| word.iter().fold(0, |word, &byte| word << 8 | byte as u32)).collect();
+        Random { given, ..Random::new(bytes.len() as u64) }
     }
 
     /// 64 random bits.
     pub fn double_word(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
+        self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.state;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         z ^ (z >> 31)
@@ -21,7 +31,7 @@ impl Random {
 
     /// 32 random bits.
     pub fn word(&mut self) -> u32 {
-        (self.double_word() >> 32) as u32
+        self.given.pop().unwrap_or_else(|| (self.double_word() >> 32) as u32)
     }
 
     /// From `low` to `high`, both included.

@@ -1,4 +1,7 @@
-//! What several tests share: where the data are, and loud words for what is skipped.
+//! What several tests share: where the data are, loud words for what is skipped, the bodies of the fuzz targets, and a count of costs.
+
+pub mod cost;
+pub mod targets;
 
 use std::path::{Path, PathBuf};
 
@@ -31,4 +34,19 @@ pub fn program() -> PathBuf {
     let path = folder.join(format!("selvedge{}", std::env::consts::EXE_SUFFIX));
     assert!(path.exists(), "{} is built by `cargo build --workspace`", path.display());
     path
+}
+
+/// Seeds and regressions of a fuzz target, by name.
+pub fn seeds(target: &str) -> Vec<(PathBuf, Vec<u8>)> {
+    let mut found = Vec::new();
+    for kind in ["seeds", "regressions"] {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz").join(kind).join(target);
+        let Ok(entries) = std::fs::read_dir(&folder) else { continue };
+        found.extend(entries.filter_map(|entry| entry.ok().map(|entry| entry.path())).map(|path| {
+            let bytes = std::fs::read(&path).expect("a seed");
+            (path, bytes)
+        }));
+    }
+    found.sort();
+    found
 }

@@ -114,7 +114,8 @@ fn meet(prepared: &Prepared<'_>, ensembles: &[Ensemble; 3], wish: Wish, options:
     let log = matches!(prepared.forward.transfer, TransferModel::Log2 { .. });
     let same_domain = matches!((wish, log), (Wish::LogRms(_), true) | (Wish::LinearRms(_) | Wish::Psnr(_), false));
     let mut goal = match wish {
-        Wish::LogRms(rms) | Wish::LinearRms(rms) if same_domain => rms,
+        // A little below, so that the first attempt is on the right side.
+        Wish::LogRms(rms) | Wish::LinearRms(rms) if same_domain => rms * 0.997,
         Wish::Psnr(db) if !log => prepared.levels[0].statistics().largest as f64 / 10f64.powf(db / 20.0),
         _ => {
             if log {

@@ -1,23 +1,23 @@
 //! The commands that make, compare and change files of materials: their options, and what they do with them.
 
-use crate::{Source as FileSource, parse_angles, print, print_json};
+use super::{Source as FileSource, parse_angles, print, print_json};
+use crate::blend::{Blend, blend};
+use crate::dataset::{Dataset, Description, Sample};
+use crate::dictionary::Ensemble;
+use crate::dictionary_file::{self, Training};
+use crate::encode::driver::{Event, Wish, encode_verified};
+use crate::encode::{Options, prepare};
+use crate::error::{Result, ToolError};
+use crate::folder::{self, ImportOptions};
+use crate::measure::{self, Metrics, Source};
+use crate::model::{MetadataModel, TransferModel};
+use crate::progress::Progress;
+use crate::sector::Sector;
+use crate::synth::{self, Mesostructure};
+use crate::trim::{Keep, Trim, trim};
+use crate::{files, measure::Place, picture, pyramid, read, train, write};
 use clap::{Args, Subcommand, ValueEnum};
 use selvedge::{Direction, Limits, Selvedge};
-use selvedge_tools::blend::{Blend, blend};
-use selvedge_tools::dataset::{Dataset, Description, Sample};
-use selvedge_tools::dictionary::Ensemble;
-use selvedge_tools::dictionary_file::{self, Training};
-use selvedge_tools::encode::driver::{Event, Wish, encode_verified};
-use selvedge_tools::encode::{Options, prepare};
-use selvedge_tools::error::{Result, ToolError};
-use selvedge_tools::folder::{self, ImportOptions};
-use selvedge_tools::measure::{self, Metrics, Source};
-use selvedge_tools::model::{MetadataModel, TransferModel};
-use selvedge_tools::progress::Progress;
-use selvedge_tools::sector::Sector;
-use selvedge_tools::synth::{self, Mesostructure};
-use selvedge_tools::trim::{Keep, Trim, trim};
-use selvedge_tools::{files, measure::Place, picture, pyramid, read, train, write};
 use std::path::{Path, PathBuf};
 
 /// Commands of this module.
@@ -693,7 +693,7 @@ fn warn_of_triangles(path: &Path, file: &Selvedge<'_>) {
 }
 
 fn trim_file(args: TrimArgs) -> Result<u8> {
-    let model = crate::with_material(&args.source, |file| {
+    let model = super::with_material(&args.source, |file| {
         warn_of_triangles(&args.source.file, &file);
         Ok(read::model_of(&file))
     })?;

@@ -1,0 +1,152 @@
+//! Counts what a filtered sample costs, by walking it: the multiplications of values that 4.2 prices.
+//!
+//! The walk uses the core's own parts and follows the plain path step by step; it gives the values too, so that a walk which strays
+//! from the decoder is found out. Prices are those of the steps that are taken, where the file states those of the worst sample.
+
+use selvedge::direction::{clamp_direction, coarse_q14, cross, grid_cell, grid_start, point, triangles_start};
+use selvedge::ensemble::{RECORD_BOUND, Record, blend_column, blend_span, coefficients_start, dequantise, low_part, read_record};
+use selvedge::fixed::{clamp_magnitude, multiply_q15, round_shift};
+use selvedge::interpolation::{VALUE_BOUND, mean_q20, scale_q15, scale_texture};
+use selvedge::material::{CHANNEL_FULL, CHANNEL_MISSING, Channel, level_size};
+use selvedge::position::{Span, axis_at_position, block_count};
+use selvedge::words::{bit_window, high_i16, low_i16, word};
+use selvedge::{Direction, Selvedge, Taps};
+
+/// A walk's count and what it came to.
+pub struct Counted {
+    /// Multiplications of values.
+    pub operations: u64,
+    /// Channel values, Q20.
+    pub values: [i32; 3],
+}
+
+/// Walks a filtered sample of one level.
+pub fn filtered(material: &Selvedge<'_>, level: u32, u_q32: u32, v_q32: u32, light: Direction, view: Direction) -> Counted {
+    let (words, m) = (material.words(), material.material());
+    let mut operations = 18;
+    operations += locate(material, m.light_start, light) + locate(material, m.view_start, view);
+    let (light, view) = (material.locate_light(light), material.locate_view(view));
+    let axis = |size: u32, at: u32| axis_at_position(m.edge, m.edge_reciprocal_q18, level_size(size, level), at);
+    let (x, y) = (axis(m.width, u_q32), axis(m.height, v_q32));
+    let spans = |axis: selvedge::position::Axis| if axis.count == 2 { vec![axis.first, axis.second] } else { vec![axis.first] };
+    let values = m.channels.map(|channel| {
+        if channel.state == CHANNEL_MISSING {
+            return 0;
+        }
+        let mean = mean_q20(words, m, channel, light, view);
+        // Three rows of three products, then three products of rows: twelve, and three for the table's base and shift.
+        operations += 15;
+        if channel.state != CHANNEL_FULL {
+            return clamp_magnitude(mean, VALUE_BOUND);
+        }
+        let mut texture = 0i32;
+        for span_y in spans(y) {
+            for span_x in spans(x) {
+                let block = span_y.block * block_count(m, level_size(m.width, level)) + span_x.block;
+                for layer in 0..m.layer_limit {
+                    let record = read_record(words, coefficients_start(words, m, channel, level, layer), block);
+                    if record.count > 0 {
+                        texture = texture.wrapping_add(walk_record(material, channel, record, span_x, span_y, light, view, &mut operations));
+                    }
+                }
+            }
+        }
+        if channel.scale_start != 0 {
+            operations += 17;
+            texture = scale_texture(texture, scale_q15(words, m, channel, light, view), word(words, channel.scale_start + 1));
+        }
+        clamp_magnitude(texture.wrapping_add(mean), VALUE_BOUND)
+    });
+    // Matrix, transfer and presentation.
+    operations += 102;
+    Counted { operations, values }
+}
+
+/// Candidates of the direction's cell up to the one that holds it, and all edges of the hull where none does.
+fn locate(material: &Selvedge<'_>, start: u32, direction: Direction) -> u64 {
+    let words = material.words();
+    let asked = clamp_direction(direction);
+    let (px, py) = (coarse_q14(asked.x_q18), coarse_q14(asked.y_q18));
+    let size = word(words, start + 3);
+    let cell = grid_cell(py, size) * size + grid_cell(px, size);
+    let grid = grid_start(words, start);
+    let at = |index: u32| {
+        let pair = point(words, start, index);
+        (low_i16(pair), high_i16(pair))
+    };
+    let mut seen = 0;
+    for candidate in word(words, grid + cell)..word(words, grid + cell + 1) {
+        seen += 1;
+        let triangle = triangles_start(words, start) + word(words, grid + size * size + 1 + candidate) * 3;
+        let (first, second) = (word(words, triangle), word(words, triangle + 1));
+        let corners = [at(first & 0xffff), at(first >> 16), at(second & 0xffff)];
+        let inside = (0..3).all(|i| {
+            let (a, b) = (corners[i], corners[(i + 1) % 3]);
+            cross(a.0, a.1, b.0, b.1, px, py) >= 0
+        });
+        if inside {
+            // Two weights by reciprocal; the areas at full precision are moved by two products each.
+            return 2 + 6 * seen + 7;
+        }
+    }
+    2 + 6 * seen + 6 * word(words, start + 2) as u64 + 7
+}
+
+/// One record, step by step as 10.7 goes.
+fn walk_record(material: &Selvedge<'_>, channel: Channel, record: Record, x: Span, y: Span, light: Taps, view: Taps, operations: &mut u64) -> i32 {
+    let words = material.words();
+    let table = |section: u32, second: u32| {
+        let entry = section + 2 + record.dictionary * 4 + second;
+        (section + word(words, entry + 2), word(words, entry).div_ceil(2))
+    };
+    let (light_table, view_table) = (table(channel.angular_start, 0), table(channel.angular_start, 1));
+    let (x_table, y_table) = (table(channel.spatial_start, 0), table(channel.spatial_start, 1));
+    let atoms = channel.atoms_start + word(words, channel.atoms_start + 3 + record.dictionary * 2);
+    let field_bits = record.low_bits + record.value_bits;
+    let (mut total, mut sum_y, mut sum_xy) = (0i32, 0i32, 0i32);
+    let (mut at_x, mut at_y) = (0, 0);
+    let (mut bit, mut high) = (record.highs_bit, 0);
+    // A close of the sum over x, or of that over y: two products to blend the column, two to multiply by it in halves.
+    let mut close = |sum: i32, u: i32| {
+        *operations += 4;
+        multiply_q15(sum, u)
+    };
+    let mut of_coefficients = 0;
+    for index in 0..record.count {
+        loop {
+            let window = bit_window(words, record.stream, bit);
+            if window != 0 {
+                high += window.trailing_zeros();
+                bit += window.trailing_zeros() + 1;
+                break;
+            }
+            high += 32;
+            bit += 32;
+        }
+        let field = bit_window(words, record.stream, record.fields_bit + index * field_bits);
+        let position = high << record.low_bits | low_part(field, record.low_bits);
+        let value = low_part(field >> record.low_bits, record.value_bits);
+        let (atom, quantiser) = (word(words, atoms + position * 2), word(words, atoms + position * 2 + 1));
+        let (next_x, next_y) = (atom >> 24 & 0xf, atom >> 28);
+        if (next_x, next_y) != (at_x, at_y) {
+            sum_y = sum_y.wrapping_add(close(sum_xy, blend_span(words, x_table.0, x_table.1, x, at_x)));
+            sum_xy = 0;
+            at_x = next_x;
+        }
+        if next_y != at_y {
+            total = total.wrapping_add(close(sum_y, blend_span(words, y_table.0, y_table.1, y, at_y)));
+            sum_y = 0;
+            at_y = next_y;
+        }
+        let u_light = blend_column(words, light_table.0, light_table.1, light, atom >> 14 & 0x3ff);
+        let u_view = blend_column(words, view_table.0, view_table.1, view, atom >> 4 & 0x3ff);
+        let u_angular = u_light.wrapping_mul(u_view).wrapping_add(1 << 14) >> 15;
+        sum_xy = sum_xy.wrapping_add(round_shift(dequantise(quantiser, value, record.value_bits).wrapping_mul(u_angular), atom & 0xf));
+        // Dequantised, blended twice by three, multiplied with each other and with the coefficient.
+        of_coefficients += 9;
+    }
+    sum_y = sum_y.wrapping_add(close(sum_xy, blend_span(words, x_table.0, x_table.1, x, at_x)));
+    total = total.wrapping_add(close(sum_y, blend_span(words, y_table.0, y_table.1, y, at_y)));
+    *operations += of_coefficients;
+    clamp_magnitude(round_shift(total, record.shift), RECORD_BOUND)
+}
