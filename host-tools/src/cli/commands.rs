@@ -674,6 +674,9 @@ pub struct TrimArgs {
     /// Keep views, likewise
     #[arg(long, value_parser = parse_sector)]
     views: Option<Sector>,
+    /// Let a file whose triangles are not those of this tool be triangulated anew, which changes results between directions
+    #[arg(long)]
+    retriangulate: bool,
 }
 
 fn parse_sector(text: &str) -> std::result::Result<Sector, String> {
@@ -694,7 +697,11 @@ fn warn_of_triangles(path: &Path, file: &Selvedge<'_>) {
 
 fn trim_file(args: TrimArgs) -> Result<u8> {
     let model = super::with_material(&args.source, |file| {
-        warn_of_triangles(&args.source.file, &file);
+        // 10.8-3: what is left has the results of the original.
+        if !args.retriangulate && !read::same_triangles(&file) {
+            let why = "its directions are triangulated in another way than this tool does it, so results between them would change";
+            return Err(ToolError::Usage(format!("{}: {why}; --retriangulate allows it", args.source.file.display())));
+        }
         Ok(read::model_of(&file))
     })?;
     let channels = args.channels.unwrap_or(Trim::default().channels);
