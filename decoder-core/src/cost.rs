@@ -35,7 +35,8 @@ pub struct Shape {
 ///
 /// `records` is the largest sum, over the levels, of [`record_operations`] of every layer and channel.
 pub fn filtered_operations(shape: Shape, records: u64) -> u32 {
-    let [light, view] = [0, 1].map(|i| locate_operations(shape.candidates[i], shape.hull_counts[i]));
+    let ([light_candidates, view_candidates], [light_hull, view_hull]) = (shape.candidates, shape.hull_counts);
+    let (light, view) = (locate_operations(light_candidates, light_hull), locate_operations(view_candidates, view_hull));
     let axes = 18;
     let colour = 102;
     let sum = axes + light + view + 15 * shape.means as u64 + 17 * shape.scales as u64 + 4 * records + colour;

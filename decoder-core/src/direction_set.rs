@@ -232,16 +232,19 @@ fn check_grid(check: &mut Check<'_, '_>, set: &Set) -> bool {
         before = from;
     }
     let candidates = set.grid + cells + 1;
-    for cell in 0..cells {
-        let (x, y) = (cell_range(cell % set.grid_size, set.grid_size), cell_range(cell / set.grid_size, set.grid_size));
-        let mut previous = None;
-        for at in word(check.words, set.grid + cell)..word(check.words, set.grid + cell + 1) {
-            let triangle = word(check.words, candidates + at);
-            let holds = triangle < set.triangle_count && previous.is_none_or(|p| p < triangle) && meets_cell(set.triangle(check, triangle), x, y);
-            sound &= check.ensure(holds, Rule::GridCandidate, set.byte(candidates + at), triangle);
-            previous = Some(triangle);
-            if check.stopped {
-                return false;
+    for cell_y in 0..set.grid_size {
+        for cell_x in 0..set.grid_size {
+            let cell = cell_y * set.grid_size + cell_x;
+            let (x, y) = (cell_range(cell_x, set.grid_size), cell_range(cell_y, set.grid_size));
+            let mut previous = None;
+            for at in word(check.words, set.grid + cell)..word(check.words, set.grid + cell + 1) {
+                let triangle = word(check.words, candidates + at);
+                let holds = triangle < set.triangle_count && previous.is_none_or(|p| p < triangle) && meets_cell(set.triangle(check, triangle), x, y);
+                sound &= check.ensure(holds, Rule::GridCandidate, set.byte(candidates + at), triangle);
+                previous = Some(triangle);
+                if check.stopped {
+                    return false;
+                }
             }
         }
     }

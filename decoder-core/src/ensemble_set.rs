@@ -241,7 +241,7 @@ pub(crate) fn check_coefficients(check: &mut Check<'_, '_>, section: Section, he
     if !check.ensure(widths_good, Rule::CoefficientsHeader, offset, widths) {
         return None;
     }
-    let along = |size: u32| level_size(size, level).div_ceil(header.edge);
+    let along = |size: u32| level_size(size, level).div_ceil(header.edge.max(1));
     let blocks = along(header.width) * along(header.height);
     let stated = check.word_at(offset + 4);
     if !check.ensure(stated == blocks, Rule::CoefficientsHeader, offset + 4, stated) {

@@ -193,7 +193,7 @@ fn describe(header: &Header) -> Material {
         exponent,
         matrix_q13: header.matrix_q13,
         edge: header.edge,
-        edge_reciprocal_q18: (1u32 << 18).div_ceil(header.edge),
+        edge_reciprocal_q18: (1u32 << 18).div_ceil(header.edge.max(1)),
         layer_count: header.layer_count,
         layer_limit: header.layer_count,
         full_count,
@@ -232,7 +232,8 @@ impl<'a> Selvedge<'a> {
 
     /// The same material, decoded only up to a quality layer: 1 for the first alone. Its digest is then that of the layers.
     pub fn with_layers(mut self, layers: u32) -> Self {
-        self.material.layer_limit = layers.clamp(1, self.header.layer_count);
+        // Not `clamp`, which panics if its bounds cross.
+        self.material.layer_limit = layers.min(self.header.layer_count).max(1);
         self
     }
 

@@ -93,6 +93,7 @@ fn locate(material: &Selvedge<'_>, start: u32, direction: Direction) -> u64 {
 }
 
 /// One record, step by step as 10.7 goes.
+#[allow(clippy::too_many_arguments, reason = "those of its twin in the core, and the count")]
 fn walk_record(material: &Selvedge<'_>, channel: Channel, record: Record, x: Span, y: Span, light: Taps, view: Taps, operations: &mut u64) -> i32 {
     let words = material.words();
     let table = |section: u32, second: u32| {

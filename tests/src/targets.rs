@@ -146,7 +146,7 @@ pub fn open(data: &[u8]) {
     let mut file = data.to_vec();
     repair_checksums(&mut file);
     open_and_sample(&file, None);
-    let middle = file.len() / 2 & !15;
+    let middle = (file.len() / 2) & !15;
     open_and_sample(&file[..middle], Some(&file[middle..]));
 }
 
