@@ -43,7 +43,12 @@ fn extreme_files() -> Vec<(Vec<u8>, Vec<u8>)> {
         let has_texture = model.channels.iter().any(|channel| channel.ensemble.is_some());
         if seed % 5 == 0 && has_texture { write::write_split(&model) } else { (write::write_material(&model), Vec::new()) }
     };
-    (0..EXTREME_FILES).map(split).collect()
+    let suite = selvedge_tests::targets::suite();
+    let of_suite = suite.iter().filter(|v| matches!(v.answer, selvedge_tools::vectors::Answer::Digest(_))).map(|v| {
+        let dictionary = v.dictionary.as_ref().and_then(|path| suite.iter().find(|d| d.path == *path));
+        (v.bytes.clone(), dictionary.map_or(Vec::new(), |d| d.bytes.clone()))
+    });
+    (0..EXTREME_FILES).map(split).chain(of_suite).collect()
 }
 
 fn open(files: &[(Vec<u8>, Vec<u8>)]) -> Vec<Selvedge<'_>> {

@@ -97,6 +97,50 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// A direction is inside one triangle, on a side of two, at a corner of several, or outside all; taps tell the place itself.
+    #[test]
+    fn a_direction_is_in_one_triangle_or_on_the_hull(seed in 0u64..1_000_000) {
+        let model = extreme_model(seed);
+        let file = write_material(&model);
+        let material = selvedge::open(&file, &Limits::NONE).expect("legal");
+        let triangles = selvedge_tools::triangulate::triangulate(&model.lights, None).triangles;
+        let mut random = Random::new(seed);
+        for _ in 0..100 {
+            let asked = direction(&mut random);
+            let p = [asked.x_q18, asked.y_q18].map(|c| (c.clamp(-262_144, 262_144) + 8) >> 4);
+            let at = |i: u32| model.lights[i as usize];
+            let side = |a: [i32; 2], b: [i32; 2]| (b[0] - a[0]) as i64 * (p[1] - a[1]) as i64 - (b[1] - a[1]) as i64 * (p[0] - a[0]) as i64;
+            let sides = |t: &[u32; 3]| [side(at(t[0]), at(t[1])), side(at(t[1]), at(t[2])), side(at(t[2]), at(t[0]))];
+            let strictly = triangles.iter().filter(|t| sides(t).iter().all(|&s| s > 0)).count();
+            let touched = triangles.iter().filter(|t| sides(t).iter().all(|&s| s >= 0)).count();
+            prop_assert!(strictly <= 1 && (strictly == 0 || touched == 1), "{} {}", strictly, touched);
+            let taps = material.locate_light(asked);
+            if touched > 0 {
+                // Continuity: whichever triangle answers, its weights give the place back, so neighbours agree along their side.
+                let weights = [(taps.a, taps.weight_a_q15), (taps.b, taps.weight_b_q15), (taps.c, taps.weight_c_q15)];
+                for c in 0..2 {
+                    let blend: i64 = weights.iter().map(|&(i, w)| at(i)[c] as i64 * w as i64).sum();
+                    let wanted = [asked.x_q18, asked.y_q18][c].clamp(-262_144, 262_144) as f64 / 16.0;
+                    prop_assert!((blend as f64 / 32_768.0 - wanted).abs() <= 3.0, "{} {}", blend as f64 / 32_768.0, wanted);
+                }
+            } else {
+                prop_assert_eq!(taps.weight_c_q15, 0);
+            }
+        }
+    }
+
+    /// A file, its model and a file again are the same bytes.
+    #[test]
+    fn decoding_and_encoding_is_the_identity(seed in 0u64..1_000_000) {
+        let file = write_material(&extreme_model(seed));
+        let back = selvedge_tools::read::read_model(&file, None, &Limits::NONE).expect("legal");
+        prop_assert!(write_material(&back) == file);
+    }
+}
+
 /// Written in the model's own terms: a sample direction is found, alone and whole.
 #[test]
 fn sample_directions_are_found() {
