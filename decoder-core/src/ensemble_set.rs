@@ -369,7 +369,7 @@ fn scan_record(bytes: &[u8], list: &[[u8; 8]], layout: Layout) -> Scan {
     let (mut count_so_far, mut last, mut sum, mut order, mut beyond) = (0u32, highs, 0i32, 0i64, None);
     let mut next = 0i64;
     while count_so_far < count {
-        let Some(place) = ones.next() else { break };
+        let Some(place) = ones.take() else { break };
         last = place + 1;
         let high = place - highs - count_so_far;
         let field = window(bytes, field_bit) as u32;

@@ -74,7 +74,7 @@ mod records;
 pub mod result;
 mod sha256;
 #[cfg(feature = "sparse-ensemble")]
-mod stream;
+pub mod stream;
 pub mod words;
 
 #[cfg(feature = "batch")]

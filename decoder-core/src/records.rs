@@ -48,7 +48,7 @@ pub(crate) fn for_each_coefficient(words: Words<'_>, channel: Channel, record: &
     let mut ones = Ones::new(stream, record.highs_bit, u32::MAX);
     let mut field_bit = record.fields_bit;
     for index in 0..record.count {
-        let Some(place) = ones.next() else { return };
+        let Some(place) = ones.take() else { return };
         let high = place.wrapping_sub(record.highs_bit).wrapping_sub(index);
         let field = window(stream, field_bit) as u32;
         field_bit = field_bit.wrapping_add(field_bits);

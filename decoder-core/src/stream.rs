@@ -5,7 +5,7 @@
 
 /// Up to 57 bits of a stream from `bit` on; zero beyond its end.
 #[inline(always)]
-pub(crate) fn window(stream: &[u8], bit: u32) -> u64 {
+pub fn window(stream: &[u8], bit: u32) -> u64 {
     let from = (bit >> 3) as usize;
     match stream.get(from..from.wrapping_add(8)) {
         Some(&[a, b, c, d, e, f, g, h]) => u64::from_le_bytes([a, b, c, d, e, f, g, h]) >> (bit & 7),
@@ -22,7 +22,7 @@ fn last_window(stream: &[u8], bit: u32) -> u64 {
 }
 
 /// The places of the one bits of a stream.
-pub(crate) struct Ones<'a> {
+pub struct Ones<'a> {
     bytes: &'a [u8],
     base: u32,
     end: u32,
@@ -49,7 +49,7 @@ impl<'a> Ones<'a> {
 
     /// The next place.
     #[inline(always)]
-    pub fn next(&mut self) -> Option<u32> {
+    pub fn take(&mut self) -> Option<u32> {
         while self.ones == 0 {
             self.base = self.base.saturating_add(STEP);
             if self.base >= self.end {

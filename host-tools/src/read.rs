@@ -14,7 +14,8 @@ use selvedge::direction::{hull_start, point, triangles_start};
 use selvedge::directory::OPTIONAL;
 use selvedge::ensemble::{Record, coefficients_start, low_part, read_record};
 use selvedge::material::{CHANNEL_FULL, CHANNEL_MISSING, Channel, TRANSFER_LINEAR, level_size};
-use selvedge::words::{Words, bit_window, high_i16, low_i16, packed_i16, word};
+use selvedge::stream::{Ones, window};
+use selvedge::words::{Words, high_i16, low_i16, packed_i16, word};
 use selvedge::{Finding, Limits, Selvedge};
 
 /// Opens a material and takes it apart; factors of an external dictionary become the model's own.
@@ -167,18 +168,13 @@ fn record(words: Words<'_>, record: Record) -> RecordModel {
 /// Position and value of each coefficient of a record that has some.
 pub(crate) fn record_coefficients(words: Words<'_>, record: Record, mut each: impl FnMut(u32, u32)) {
     let field_bits = record.low_bits + record.value_bits;
-    let (mut bit, mut high) = (record.highs_bit, 0);
+    // Coefficients are in the material's own file, whose words are numbered from zero.
+    let bytes = &words.file[record.stream as usize * 4..];
+    let mut ones = Ones::new(bytes, record.highs_bit, (bytes.len() as u64 * 8).min(u32::MAX as u64) as u32);
     for index in 0..record.count {
-        let mut window = bit_window(words, record.stream, bit);
-        while window == 0 && high < 65_536 {
-            high += 32;
-            bit += 32;
-            window = bit_window(words, record.stream, bit);
-        }
-        let zeros = window.trailing_zeros() & 31;
-        high += zeros;
-        bit += zeros + 1;
-        let field = bit_window(words, record.stream, record.fields_bit + index * field_bits);
+        let Some(place) = ones.take() else { return };
+        let high = place - record.highs_bit - index;
+        let field = window(bytes, record.fields_bit + index * field_bits) as u32;
         each(high << record.low_bits | low_part(field, record.low_bits), low_part(field >> record.low_bits, record.value_bits));
     }
 }

@@ -1,0 +1,99 @@
+//! The conformance suite, with nothing but the core: every vector is answered as its manifest states, on every path.
+
+use selvedge::{Direction, FilteredQuery, First, Limits, Part, Rgb, Selvedge, open_with, validate};
+use std::path::{Path, PathBuf};
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../spec/vectors")
+}
+
+fn read(file: &str) -> Vec<u8> {
+    std::fs::read(folder().join(file)).expect("a file of the suite")
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Batches and images give what single samples give.
+fn fast_paths_agree(material: &Selvedge<'_>) {
+    let mut state = 1u32;
+    let mut next = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        state
+    };
+    let queries: Vec<FilteredQuery> = (0..48)
+        .map(|_| {
+            let mut direction =
+                || Direction { x_q18: (next() >> 13) as i32 - 262_144, y_q18: (next() >> 13) as i32 - 262_144, z_q15: (next() >> 16) as i32 - 100 };
+            let (light, view) = (direction(), direction());
+            FilteredQuery { u_q32: next(), v_q32: next(), light, view }
+        })
+        .collect();
+    let mut scratch = vec![-1; material.batch_scratch_len(queries.len())];
+    let mut out = vec![Rgb::default(); queries.len()];
+    material.sample_batch(&queries, &mut scratch, &mut out).expect("buffers fit");
+    for (query, rgb) in queries.iter().zip(&out) {
+        assert_eq!(material.filtered(query.u_q32, query.v_q32, query.light, query.view), *rgb);
+    }
+    assert!(material.sample_batch(&queries, &mut scratch[1..], &mut out).is_err() || material.batch_scratch_len(queries.len()) == 0);
+    for level in 0..material.header().level_count {
+        let [width, height] = material.image_size(level);
+        let texels = (width * height) as usize;
+        let (light, view) = (queries[0].light, queries[0].view);
+        let mut scratch = vec![-1; material.image_scratch_len()];
+        let mut image = vec![Rgb::default(); texels];
+        material.decode_image(level, light, view, &mut scratch, &mut image).expect("buffers fit");
+        let mut channel = vec![0; texels];
+        material.decode_channel(0, level, light, view, &mut scratch, &mut channel).expect("buffers fit");
+        assert!(material.decode_image(level, light, view, &mut scratch, &mut image[1..]).is_err());
+        let (light, view) = (material.locate_light(light), material.locate_view(view));
+        for i in (0..texels).step_by(1 + texels / 200).filter(|_| level == 0) {
+            let (x, y) = (i as u32 % width, i as u32 / width);
+            let values = selvedge::interpolation::texel_values(material.words(), material.material(), x, y, light, view);
+            assert_eq!((selvedge::interpolation::radiance(material.material(), values, light), values.c0), (image[i], channel[i]));
+        }
+    }
+}
+
+#[test]
+fn the_suite_is_answered_as_stated() {
+    let manifest = String::from_utf8(read("manifest.tsv")).expect("text");
+    let mut count = 0;
+    for line in manifest.lines().filter(|line| !line.starts_with('#')) {
+        let columns: Vec<&str> = line.split('\t').collect();
+        let (file, dictionary) = (read(columns[1]), (columns[2] != "-").then(|| read(columns[2])));
+        let number = |text: &str| text.parse::<u32>().expect("a number");
+        let valid = columns[0] == "valid";
+        let mut limits = Limits::NONE;
+        if !valid && columns[3] != "-" {
+            let all: Vec<u32> = columns[3].split(',').map(number).map(|n| if n == 0 { u32::MAX } else { n }).collect();
+            limits = Limits { bytes: all[0], operations: all[1], texels: all[2] };
+        }
+        let is_dictionary = file.get(16) == Some(&1);
+        let mut first = First::default();
+        validate(&file, dictionary.as_deref(), &limits, &mut first);
+        let opened = open_with(&file, dictionary.as_deref(), &limits);
+        if !is_dictionary {
+            assert_eq!(opened.as_ref().err().copied(), first.0, "{}", columns[1]);
+        }
+        if valid {
+            assert_eq!(first.0, None, "{}", columns[1]);
+            if let Ok(material) = &opened {
+                assert_eq!(hex(&material.decode_digest()), columns[3], "{}", columns[1]);
+                fast_paths_agree(material);
+            }
+        } else {
+            let finding = first.0.unwrap_or_else(|| panic!("{}: nothing is found", columns[1]));
+            let part = if finding.part == Part::File { "file" } else { "dictionary" };
+            assert_eq!(
+                (finding.rule.id(), part, finding.offset, finding.found),
+                (columns[4], columns[5], number(columns[6]), number(columns[7])),
+                "{}",
+                columns[1]
+            );
+        }
+        count += 1;
+    }
+    assert!(count > 200, "{count}");
+}
