@@ -56,6 +56,23 @@ fn fast_paths_agree(material: &Selvedge<'_>) {
     }
 }
 
+/// A sample direction is found, alone and whole; on the horizon no light arrives (5.1-4, 5.6-3).
+fn sample_directions_are_found(material: &Selvedge<'_>) {
+    let (words, start) = (material.words(), material.material().light_start);
+    for i in 0..material.header().light_count {
+        let pair = selvedge::direction::point(words, start, i);
+        let asked = material.light_direction(i);
+        assert_eq!([asked.x_q18, asked.y_q18], [(pair as u16 as i16 as i32) * 16, ((pair >> 16) as u16 as i16 as i32) * 16]);
+        let taps = material.locate_light(asked);
+        let own: i32 = [(taps.a, taps.weight_a_q15), (taps.b, taps.weight_b_q15), (taps.c, taps.weight_c_q15)].iter().filter(|t| t.0 == i).map(|t| t.1).sum();
+        assert_eq!((own, taps.weight_a_q15 + taps.weight_b_q15 + taps.weight_c_q15), (32_768, 32_768));
+        for (z_q15, lit) in [(0, false), (-1, false), (asked.z_q15, asked.z_q15 > 0)] {
+            assert_eq!(material.locate_light(Direction { z_q15, ..asked }).cosine_q15 > 0, lit, "{z_q15}");
+        }
+        assert_eq!(material.light_direction(u32::MAX), material.light_direction(material.header().light_count - 1));
+    }
+}
+
 #[test]
 fn the_suite_is_answered_as_stated() {
     let manifest = String::from_utf8(read("manifest.tsv")).expect("text");
@@ -82,6 +99,7 @@ fn the_suite_is_answered_as_stated() {
             if let Ok(material) = &opened {
                 assert_eq!(hex(&material.decode_digest()), columns[3], "{}", columns[1]);
                 fast_paths_agree(material);
+                sample_directions_are_found(material);
             }
         } else {
             let finding = first.0.unwrap_or_else(|| panic!("{}: nothing is found", columns[1]));

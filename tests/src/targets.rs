@@ -61,6 +61,7 @@ fn check_finding(finding: Finding, file: &[u8], dictionary: Option<&[u8]>) {
     let part = if finding.part == Part::File { file } else { dictionary.unwrap_or(&[]) };
     // The end of the file and the begin of a directory that is not there may be named.
     assert!(finding.offset as usize <= part.len().max(128), "{finding}");
+    assert!(finding.to_string().contains(finding.rule.id()) && !finding.rule.name().is_empty());
 }
 
 fn direction(random: &mut Random) -> Direction {
@@ -128,16 +129,44 @@ fn sample_all_paths(material: &Selvedge<'_>, seed: u64) {
         let mut scratch = vec![-1; material.image_scratch_len()];
         let mut image = vec![Rgb::default(); (width * height) as usize];
         material.decode_image(0, light, view, &mut scratch, &mut image).expect("buffers fit");
+        let mut channels = vec![vec![0; image.len()]; 3];
+        for (c, channel) in channels.iter_mut().enumerate() {
+            material.decode_channel(c, 0, light, view, &mut scratch, channel).expect("buffers fit");
+            let short = channel.len() - 1;
+            let error = material.decode_channel(c, 0, light, view, &mut scratch, &mut channel[..short]).expect_err("one texel too few");
+            assert_eq!((error.needed, error.lent), (short + 1, short));
+        }
         let (light, view) = (material.locate_light(light), material.locate_view(view));
         for _ in 0..4 {
             let (x, y) = (random.word() % width, random.word() % height);
             let values = selvedge::interpolation::texel_values(material.words(), material.material(), x, y, light, view);
-            assert_eq!(selvedge::interpolation::radiance(material.material(), values, light), image[(y * width + x) as usize]);
+            let at = (y * width + x) as usize;
+            assert_eq!(selvedge::interpolation::radiance(material.material(), values, light), image[at]);
+            assert_eq!([values.c0, values.c1, values.c2], [channels[0][at], channels[1][at], channels[2][at]]);
         }
     }
+    floats(random);
+    // In a buffer of several files every word moves by the same number, the dictionary's by its own.
+    let (here, there) = (material.material_at(0, 0), material.material_at(16, 1 << 20));
+    assert_eq!((there.file_start, there.light_start, there.channels[0].state), (16, here.light_start + 16, here.channels[0].state));
     let metadata = material.metadata();
     assert!(metadata.name.len() + metadata.origin.len() + metadata.licence.len() <= header.file_length as usize);
     assert!(material.sections().all(|s| s.offset as u64 + s.length as u64 <= header.file_length as u64));
+}
+
+/// Directions and positions of any floats lie where they may.
+fn floats(random: &mut Random) {
+    let mut float = || f32::from_bits(random.word());
+    let d = Direction::from_unit_vector([float(), float(), float()]);
+    assert!(d.x_q18.abs() <= 1 << 18 && d.y_q18.abs() <= 1 << 18 && d.z_q15.abs() <= 1 << 15, "{d:?}");
+    let position = float();
+    let fraction = selvedge::position_from_f32(position);
+    if (0.0..1.0).contains(&position) {
+        let exact = (position as f64 * 4_294_967_296.0).floor();
+        assert_eq!(fraction as f64, exact, "{position}");
+    } else if !position.is_finite() {
+        assert_eq!(fraction, 0);
+    }
 }
 
 /// Any bytes: as they are, with checksums repaired, and cut in two as a material and its dictionary.

@@ -1,7 +1,7 @@
 //! The conformance suite: recipes make the files that are in the repository, and all of them are answered as stated.
 
 use selvedge::{First, Limits, Rule};
-use selvedge_tools::conform::run_own;
+use selvedge_tools::conform::{run_own, run_program};
 use selvedge_tools::vectors::{Answer, Vector, make, manifest, read};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -63,6 +63,22 @@ fn every_vector_is_answered_as_stated() {
         }
     }
     println!("{} vectors", suite.len());
+}
+
+/// The decoder that was written from the text alone, over its standard streams.
+#[test]
+fn the_naive_decoder_answers_as_stated() {
+    let python = std::process::Command::new("python3").arg("--version").output();
+    if !python.is_ok_and(|output| output.status.success()) {
+        eprintln!("SKIPPED: NO python3: THE NAIVE DECODER WAS NOT RUN");
+        return;
+    }
+    let script = folder().join("../naive/selvedge_naive.py");
+    let program = ["python3".to_owned(), script.to_str().expect("UTF-8").to_owned(), "serve".to_owned()];
+    let suite = suite();
+    let found = run_program(&suite, &program).expect("answers");
+    assert!(found.is_empty(), "{found:#?}");
+    println!("{} vectors, 0 answered otherwise by the naive decoder", suite.len());
 }
 
 /// A suite with one wrong answer is found out, so that the tests above can fail.
