@@ -162,6 +162,11 @@ pub fn encode(prepared: &Prepared<'_>, ensembles: &[Ensemble; 3], options: &Opti
         match found {
             Some(encoded) => return Ok(encoded),
             None if least < 1e-7 => return search.at(0.0),
+            // Where there is no room for atoms, what a lower threshold adds is little, and to look for it would not end.
+            None if least < guess * 0.05 && search.has_no_room(least) => {
+                let why = "needs more atoms than a dictionary has room for: choose a smaller edge or more dictionaries";
+                return Err(ToolError::Usage(format!("this goal in blocks of {} {why}", options.edge)));
+            }
             None => least *= 0.5,
         }
     }
@@ -180,6 +185,10 @@ impl<'a> Search<'a> {
     fn new(prepared: &'a Prepared<'a>, ensembles: &'a [Ensemble; 3], options: &'a Options, candidates: &'a [[Candidates; 3]]) -> Search<'a> {
         let channels = std::array::from_fn(|c| Channel::new(candidates.iter().map(|level| &level[c]).collect(), &ensembles[c]));
         Search { prepared, ensembles, options, candidates, channels }
+    }
+
+    fn has_no_room(&self, threshold: f64) -> bool {
+        self.channels.iter().any(|channel| channel.has_no_room(threshold as f32, COEFFICIENT_BITS))
     }
 
     /// Selections at a threshold, within the cap of operations.

@@ -79,6 +79,12 @@ impl<'a> Channel<'a> {
         (candidates.energy - kept.map(|(&value, _)| (value as f64).powi(2)).sum::<f64>()).max(0.0)
     }
 
+    /// Whether a dictionary has as many atoms at a threshold as it has room for, so that a lower one may gain little.
+    pub fn has_no_room(&self, threshold: f32, bits: f64) -> bool {
+        let alive = self.paying(threshold, bits);
+        (0..self.dictionaries).any(|k| self.keys.iter().zip(&alive).filter(|(key, alive)| **alive && key.0 as usize == k).count() >= ATOM_LIMIT as usize)
+    }
+
     /// The atoms that pay for themselves at a threshold.
     fn paying(&self, threshold: f32, bits: f64) -> Vec<bool> {
         let square = (threshold as f64).powi(2);
