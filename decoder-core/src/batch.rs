@@ -19,6 +19,7 @@ use crate::result::{BufferTooSmall, position_from_f32};
 use crate::words::{Words, high_i16, low_i16, word};
 
 /// A filtered sample to be made.
+#[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FilteredQuery {
     /// u0.32 fraction of the image along x.

@@ -2,15 +2,21 @@
 //!
 //! `high_quality DATASET EDGE THRESHOLD...`; a threshold is the magnitude below which a coefficient is not kept, in units of the channels. The
 //! error is decoded by the core at every texel, every view and every 16th light, the first of which moves from view to view.
+//!
+//! With an edge of 10 it prints instead what the published layout needs at least: five bytes for each coefficient that a threshold keeps, whatever
+//! its atom, over all blocks at once, unrounded, with the material's own bases free of charge.
 
 use selvedge::Limits;
 use selvedge_tools::dataset::Dataset;
+use selvedge_tools::encode::candidates::{Keep, collect};
 use selvedge_tools::encode::{Goal, Options, encode, prepare};
 use selvedge_tools::error::{Result, ToolError};
 use selvedge_tools::measure::{Source, compare_every};
 use selvedge_tools::model::TransferModel;
 use std::path::Path;
 
+/// Texels along the side of a block in the published layout.
+const PUBLISHED_EDGE: usize = 10;
 /// Of how many lights one is decoded.
 const EVERY: usize = 16;
 
@@ -19,6 +25,18 @@ fn run(path: &Path, edge: usize, thresholds: &[f64]) -> Result<()> {
     let offset = dataset.statistics().log_offset();
     let prepared = prepare(vec![&dataset], TransferModel::Log2 { offset }, &|_, _| ())?;
     let ensembles = prepared.own_ensembles(edge);
+    if edge == PUBLISHED_EDGE {
+        println!("| threshold | coefficients | bytes at least | log RMS at most as good |\n|---:|---:|---:|---:|");
+        for &threshold in thresholds {
+            let found = collect(&prepared.blocks(0, edge), &ensembles, Keep::Above(threshold as f32, threshold as f32), 1, &|_, _| ())?;
+            let count: usize = found.iter().map(|channel| channel.values.len()).sum();
+            let square = |v: &f32| (*v as f64).powi(2);
+            let lost: f64 = found.iter().map(|channel| channel.energy - channel.values.iter().map(square).sum::<f64>()).sum();
+            let values = (dataset.description().size.iter().map(|n| n.div_ceil(edge) * edge).product::<usize>() * dataset.description().pairs() * 3) as f64;
+            println!("| {threshold} | {count} | {} | {:.4} |", count * 5, std::f64::consts::LN_2 * (lost / values).sqrt());
+        }
+        return Ok(());
+    }
     println!("| threshold | edge | bytes | ratio | coefficients | predicted log RMS | decoded log RMS | decoded linear RMS | operations |");
     println!("|---:|---:|---:|---:|---:|---:|---:|---:|---:|");
     for &threshold in thresholds {
