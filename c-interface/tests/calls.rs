@@ -102,6 +102,30 @@ fn samples_are_those_of_the_core() {
     hold_samples(&own, &core.with_layers(1), &mut numbers, 20);
 }
 
+/// The valid vectors of the conformance suite: external dictionaries, several levels and layers, all states and transfers.
+#[test]
+fn the_suite_is_sampled_as_by_the_core() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../spec/vectors");
+    let read = |file: &str| std::fs::read(folder.join(file)).expect("a file of the suite");
+    let manifest = String::from_utf8(read("manifest.tsv")).expect("text");
+    let (mut materials, mut outside) = (0, 0);
+    for line in manifest.lines().filter(|line| line.starts_with("valid")) {
+        let columns: Vec<&str> = line.split('\t').collect();
+        let (bytes, dictionary) = (read(columns[1]), (columns[2] != "-").then(|| read(columns[2])));
+        let Ok(core) = selvedge::open_with(&bytes, dictionary.as_deref(), &Limits::default()) else { continue };
+        let (at, length) = dictionary.as_ref().map_or((null(), 0), |d| (d.as_ptr(), d.len()));
+        let mut material = selvedge_material::CLOSED;
+        assert_eq!(c!(selvedge_open(bytes.as_ptr(), bytes.len(), at, length, null(), &mut material, null_mut())), SELVEDGE_OK, "{line}");
+        hold_samples(&material, &core, &mut Numbers::new(materials), 40);
+        let digest = told(|o: *mut [u8; SELVEDGE_DIGEST_LENGTH]| c!(selvedge_decode_digest(&material, o.cast())));
+        let digest: String = digest.iter().map(|byte| format!("{byte:02x}")).collect();
+        assert_eq!(digest, columns[3], "{line}");
+        materials += 1;
+        outside += usize::from(dictionary.is_some());
+    }
+    assert!(materials > 25 && outside >= 2, "{materials} {outside}");
+}
+
 /// Any taps and values are safe, though they mean nothing.
 #[test]
 fn wild_taps_are_safe() {
