@@ -331,7 +331,12 @@ impl Selvedge<'_> {
         let light_columns = light_columns.get(..unpacked.lights).unwrap_or(&[]);
         let view_columns = view_columns.get(..unpacked.views).unwrap_or(&[]);
         let coefficients = workspace.coefficients.get(..unpacked.count).unwrap_or(&[]);
-        for (group, textures) in items.chunks(LANES).zip(textures.chunks_mut(LANES)) {
+        // Not `chunks`: built for size, its division keeps a path to a panic.
+        let (mut items, mut textures) = (items, textures);
+        while !items.is_empty() {
+            let (group, items_left) = items.split_at(LANES.min(items.len()));
+            let (sums, textures_left) = textures.split_at_mut(LANES.min(textures.len()));
+            (items, textures) = (items_left, textures_left);
             let mut x_spans = [Span::default(); LANES];
             let mut y_spans = [Span::default(); LANES];
             for (lane, item) in group.iter().enumerate() {
@@ -350,7 +355,7 @@ impl Selvedge<'_> {
                 y_spans[lane & 7] = span(rows >> 16, item[3]);
             }
             let total = sum_lanes(coefficients, light_lanes, view_lanes, |x| blend_spans(spatial[0], &x_spans, x), |y| blend_spans(spatial[1], &y_spans, y));
-            for (textures, total) in textures.iter_mut().zip(total) {
+            for (textures, total) in sums.iter_mut().zip(total) {
                 if let Some(sum) = textures.get_mut(number) {
                     *sum = sum.wrapping_add(clamp_magnitude(round_shift(total, record.shift), RECORD_BOUND));
                 }
