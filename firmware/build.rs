@@ -21,14 +21,21 @@ fn main() {
             let limits = if columns[3] == "-" { "None".to_owned() } else { format!("Some([{}])", columns[3]) };
             (limits, format!("Answer::Broken({:?}, {}, {}, {})", columns[4], columns[5] == "dictionary", columns[6], columns[7]))
         };
-        writeln!(table, "    Vector {{ file: {}, dictionary: {}, limits: {limits}, answer: {answer} }},", bytes(columns[1]), optional(columns[2])).expect("text");
+        writeln!(table, "    Vector {{ file: {}, dictionary: {}, limits: {limits}, answer: {answer} }},", bytes(columns[1]), optional(columns[2]))
+            .expect("text");
     }
     table.push_str("]\n");
     let out = std::env::var("OUT_DIR").expect("set by cargo");
     std::fs::write(Path::new(&out).join("table.rs"), table).expect("the table is written");
 
     let target = std::env::var("TARGET").expect("set by cargo");
-    let script = if target.starts_with("thumb") { Some("cortex-m.ld") } else if target.starts_with("riscv") { Some("riscv-virt.ld") } else { None };
+    let script = if target.starts_with("thumb") {
+        Some("cortex-m.ld")
+    } else if target.starts_with("riscv") {
+        Some("riscv-virt.ld")
+    } else {
+        None
+    };
     if let Some(script) = script {
         println!("cargo:rustc-link-arg-bins=-T{}", root.join(script).display());
         println!("cargo:rerun-if-changed={script}");

@@ -11,11 +11,12 @@ use crate::direction::{
 use crate::ensemble::{RECORD_BOUND, Record};
 use crate::fixed::{HALF_Q15, ONE_Q15, clamp_magnitude, multiply_q15, round_shift};
 use crate::interpolation::{VALUE_BOUND, radiance, scale_texture};
-use crate::material::{CHANNEL_FULL, CHANNEL_MISSING, Channel};
+use crate::material::{CHANNEL_FULL, CHANNEL_MISSING, Channel, METHOD_SPARSE_TENSOR};
 use crate::open::Selvedge;
 use crate::position::{Axis, Span, axis_at_position, block_count};
 use crate::records::{Blend, Table, entry, for_each_coefficient, record_of};
 use crate::result::{BufferTooSmall, position_from_f32};
+use crate::tensor_paths::{LightTable, TensorSampler};
 use crate::words::{Words, high_i16, low_i16, word};
 
 /// A filtered sample to be made.
@@ -115,6 +116,9 @@ impl Workspace<'_> {
 impl Selvedge<'_> {
     /// Words of scratch that [`Selvedge::sample_batch`] needs for `count` queries.
     pub fn batch_scratch_len(&self, count: usize) -> usize {
+        if self.material().method == METHOD_SPARSE_TENSOR {
+            return self.ready_total() + size_of::<LightTable>() / 4;
+        }
         let per_query = QUERY_WORDS + 4 * (ITEM_WORDS + PART_WORDS);
         let shared = self.ready_total() + 6 * COLUMNS + 2 * COLUMNS * LANES + self.largest_record() * COEFFICIENT_WORDS;
         count.saturating_mul(per_query).saturating_add(self.block_total() + 1 + shared)
@@ -155,6 +159,9 @@ impl Selvedge<'_> {
         }
         let needed = self.batch_scratch_len(queries.len());
         let lent = scratch.len();
+        if self.material().method == METHOD_SPARSE_TENSOR {
+            return self.sample_tensor(queries, scratch, out).ok_or(BufferTooSmall { needed, lent });
+        }
         let parts = self.split_scratch(queries.len(), scratch);
         let Some((states, items, textures, starts, ready, mut workspace)) = parts else {
             return Err(BufferTooSmall { needed, lent });
@@ -198,6 +205,29 @@ impl Selvedge<'_> {
             *rgb = self.finish(state);
         }
         Ok(())
+    }
+
+    /// The samples of a sparse tensor, one after the other. `None` if the scratch is too short.
+    fn sample_tensor(&self, queries: &[FilteredQuery], scratch: &mut [i32], out: &mut [Rgb]) -> Option<()> {
+        let (ready, rest) = scratch.split_at_mut_checked(self.ready_total())?;
+        let table: &mut LightTable = rest.as_chunks_mut::<4>().0.first_chunk_mut()?;
+        table.fill([0; 4]);
+        let material = self.material();
+        let (light, view) = ready.split_at_mut(self.ready_len(material.light_start).min(ready.len()));
+        let lights = ReadySet::new(self.words(), material.light_start, light);
+        let views = ReadySet::new(self.words(), material.view_start, view);
+        let sampler = TensorSampler::new(self);
+        for (query, rgb) in queries.iter().zip(out) {
+            let (light, view) = (lights.locate(query.light), views.locate(query.view));
+            let mut textures = Values::default();
+            if material.full_count > 0 {
+                textures = sampler.textures(self, query.u_q32, query.v_q32, light, view, table);
+            }
+            let [l0, l1, l2] = pack_taps(light);
+            let [v0, v1, v2] = pack_taps(view);
+            *rgb = self.finish(&[l0, l1, l2, v0, v1, v2, textures.c0, textures.c1, textures.c2, 0]);
+        }
+        Some(())
     }
 
     /// Cuts the scratch into its parts; `None` if it is too short.
@@ -385,7 +415,8 @@ impl Selvedge<'_> {
             if channel.state == CHANNEL_MISSING {
                 return 0;
             }
-            let mut texture = texture;
+            // A channel without texture has none, whatever its method gave.
+            let mut texture = if channel.state == CHANNEL_FULL { texture } else { 0 };
             if channel.scale_start != 0 {
                 let scale = round_shift(self.blend_pairs(channel.scale_start, light, view), 15);
                 texture = scale_texture(texture, scale, word(words, channel.scale_start.wrapping_add(1)));

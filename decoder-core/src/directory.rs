@@ -3,7 +3,7 @@
 use crate::check::{Check, Section};
 use crate::crc32::crc32;
 use crate::error::{Part, Rule};
-use crate::header::{CONTENT_DICTIONARY, ENTRY_LENGTH, HEADER_LENGTH, Header};
+use crate::header::{CONTENT_DICTIONARY, ENTRY_LENGTH, HEADER_LENGTH, Header, METHOD_SPARSE_ENSEMBLE, METHOD_SPARSE_TENSOR};
 
 /// Texts, units and frames for people and renderers (3.4).
 pub const METADATA: u32 = 0x0001;
@@ -23,6 +23,12 @@ pub const SPATIAL: u32 = 0x0111;
 pub const ATOMS: u32 = 0x0112;
 /// Coefficients: instance `level << 8 | layer << 4 | channel` (10.3).
 pub const COEFFICIENTS: u32 = 0x0113;
+/// Light atoms of a sparse tensor (12.1).
+pub const LIGHT_ATOMS: u32 = 0x0210;
+/// Fibres of a sparse tensor (12.2).
+pub const FIBRES: u32 = 0x0211;
+/// Lists of the texels: instance `level << 8 | layer << 4` (12.3).
+pub const LISTS: u32 = 0x0212;
 /// Kinds from here on may be skipped by a reader that does not know them.
 pub const OPTIONAL: u32 = 0x8000;
 
@@ -64,7 +70,7 @@ pub(crate) fn find_in(word_at: impl Fn(u32) -> u32, count: u32, kind: u32, insta
 
 /// Whether a kind belongs to the critical ones of this version.
 fn is_known(kind: u32) -> bool {
-    matches!(kind, METADATA | EXTERNAL | DIRECTIONS | MEANS | SCALES | ANGULAR | SPATIAL | ATOMS | COEFFICIENTS)
+    matches!(kind, METADATA | EXTERNAL | DIRECTIONS | MEANS | SCALES | ANGULAR | SPATIAL | ATOMS | COEFFICIENTS | LIGHT_ATOMS | FIBRES | LISTS)
 }
 
 /// What the header says of a section of a known kind.
@@ -72,10 +78,15 @@ fn called_for(header: &Header, external: bool, kind: u32, instance: u32) -> Call
     let in_dictionary = header.content == CONTENT_DICTIONARY;
     let state = header.states.get(instance as usize).copied().unwrap_or(0);
     let when = |holds: bool, call: Call| if holds { call } else { Call::Foreign };
+    let (of_ensemble, of_tensor) = (matches!(kind, ANGULAR | SPATIAL | ATOMS | COEFFICIENTS), matches!(kind, LIGHT_ATOMS | FIBRES | LISTS));
+    let textured = header.has_texture();
     match kind {
+        _ if of_ensemble && header.method != METHOD_SPARSE_ENSEMBLE => Call::Foreign,
+        _ if of_tensor && header.method != METHOD_SPARSE_TENSOR => Call::Foreign,
         METADATA => when(instance == 0, Call::Required),
         ANGULAR if in_dictionary => when(state == 2, Call::Required),
         SPATIAL if in_dictionary => when(state == 2, Call::Allowed),
+        LIGHT_ATOMS | FIBRES if in_dictionary => when(instance == 0 && textured, Call::Required),
         _ if in_dictionary => Call::Foreign,
         EXTERNAL => when(instance == 0, Call::Allowed),
         DIRECTIONS => match instance {
@@ -97,6 +108,11 @@ fn called_for(header: &Header, external: bool, kind: u32, instance: u32) -> Call
         COEFFICIENTS => {
             let (level, layer, channel) = (instance >> 8, (instance >> 4) & 0xf, instance & 0xf);
             when(level < header.level_count && layer < header.layer_count && channel < 3 && header.is_full(channel), Call::Required)
+        }
+        LIGHT_ATOMS | FIBRES => when(instance == 0 && textured && !external, Call::Required),
+        LISTS => {
+            let (level, layer, rest) = (instance >> 8, (instance >> 4) & 0xf, instance & 0xf);
+            when(level < header.level_count && layer < header.layer_count && rest == 0 && textured, Call::Required)
         }
         _ => Call::Allowed,
     }
@@ -171,6 +187,13 @@ fn check_calls(check: &mut Check<'_, '_>, header: &Header) -> bool {
             for channel in 0..3 {
                 require(check, COEFFICIENTS, level << 8 | layer << 4 | channel);
             }
+        }
+    }
+    require(check, LIGHT_ATOMS, 0);
+    require(check, FIBRES, 0);
+    for level in 0..header.level_count {
+        for layer in 0..header.layer_count {
+            require(check, LISTS, level << 8 | layer << 4);
         }
     }
     for index in 0..header.section_count {

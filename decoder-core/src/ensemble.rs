@@ -8,7 +8,7 @@ use crate::direction::Taps;
 use crate::fixed::{HALF_Q15, clamp_magnitude, multiply_q15, round_shift};
 use crate::material::{Channel, Material, level_size};
 use crate::position::{Axis, Span, block_count};
-use crate::words::{Words, bit_window, packed_i16, word};
+use crate::words::{Words, bit_window, low_part, packed_i16, word};
 
 /// Bits of a record's shift (10.4-3).
 pub const SHIFT_BITS: u32 = 5;
@@ -36,13 +36,6 @@ pub struct Record {
     pub fields_bit: u32,
     /// First bit of the high parts of the positions.
     pub highs_bit: u32,
-}
-
-/// `count` low bits of a window, for `count <= 31` (10.4-1).
-#[inline(always)]
-pub fn low_part(window: u32, count: u32) -> u32 {
-    // 10.4-1: a mask by shift; the count never reaches 32.
-    window & ((1u32 << count).wrapping_sub(1))
 }
 
 /// First word of the coefficients of a level, layer and channel, by the directory (10.3-1).

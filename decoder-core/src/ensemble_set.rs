@@ -22,7 +22,7 @@ pub const SUM_LIMIT: u32 = 65_535;
 pub const LOW_BITS_LIMIT: u32 = 12;
 
 /// Walks chapter 10 of a dictionary.
-pub(crate) fn check_method_dictionary(check: &mut Check<'_, '_>, header: &Header) -> Option<()> {
+pub(crate) fn check_ensemble_dictionary(check: &mut Check<'_, '_>, header: &Header) -> Option<()> {
     for c in 0..3 {
         if let Some(section) = find_section(check, header, ANGULAR, c) {
             let angular = check_factors(check, section, header.light_count, header.view_count, ANGULAR_COLUMN_LIMIT)?;
@@ -35,8 +35,8 @@ pub(crate) fn check_method_dictionary(check: &mut Check<'_, '_>, header: &Header
     Some(())
 }
 
-/// Walks chapter 10 of a material, but for its statement of cost; gives the largest operations of the records that one position touches.
-pub(crate) fn check_method(check: &mut Check<'_, '_>, header: &Header, external: Option<&Header>, material: &mut Material) -> Option<u64> {
+/// Walks chapter 10 of a material, but for its statement of cost; gives the largest operations of a level's textures.
+pub(crate) fn check_ensemble(check: &mut Check<'_, '_>, header: &Header, external: Option<&Header>, material: &mut Material) -> Option<u64> {
     let mut atoms = [None::<Section>; 3];
     let mut spatial_of = [None::<Factors>; 3];
     let mut angular_of = [None::<Factors>; 3];
@@ -94,7 +94,7 @@ pub(crate) fn check_method(check: &mut Check<'_, '_>, header: &Header, external:
         }
         records = records.max(at_level);
     }
-    sound.then_some(records)
+    sound.then_some(4 * records)
 }
 
 /// Factors of the external dictionary, which was checked with its own file.

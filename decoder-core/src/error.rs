@@ -129,6 +129,22 @@ rules! {
     RecordSum "10.7-7" Invalid "the shifted magnitudes of a record sum to at most 65,535";
     StreamEnd "10.4-9" Invalid "bits after the last record are zero";
     LargestCount "10.3-4" Invalid "the stated largest count is that of the records";
+    LightAtomsLength "12.1-1" Invalid "light atoms have two words and a row for each light";
+    LightAtomsCounts "12.1-2" Invalid "there are 1 to 256 light atoms, the reserved word is zero";
+    LightAtomsEntry "12.1-3" Invalid "bits of channels without texture, and the two highest, are zero";
+    FibresLength "12.2-1" Invalid "the section of fibres is as long as its counts say";
+    FibresShape "12.2-2" Invalid "there are 1 to 1,024 ABRDF atoms with 1 to 32 entries of as many index bits as the light atoms need";
+    FibresShifts "12.2-3" Invalid "bits beyond the two shifts of an ABRDF atom are zero";
+    FibreIndex "12.2-4" Invalid "an entry names a light atom that is there, an unused half is zero";
+    FibreSum "12.2-5" Invalid "the magnitudes of a fibre sum to at most eight";
+    ListsLength "12.3-2" Invalid "a section of lists is as long as its counts say";
+    ListsHeader "12.3-3" Invalid "field widths, shift and the number of texels are in range";
+    ListPlace "12.4-6" Invalid "groups and lists follow each other without a gap and end with the stream";
+    ListOutside "12.4-7" Invalid "texels outside the image have no coefficients";
+    ListIndices "12.4-8" Invalid "a list has as many ones as coefficients, and its indices ascend and name ABRDF atoms";
+    ListSum "12.5-8" Invalid "the shifted magnitudes of a list sum to at most 65,534";
+    ListsEnd "12.4-9" Invalid "bits after the last list are zero";
+    ListsLargest "12.3-4" Invalid "the stated largest count is that of the lists";
     StatedOperations "4.2-1" Invalid "the stated operations are those of the formula";
 }
 

@@ -18,8 +18,7 @@ pub const ENTRY_LENGTH: u32 = 16;
 pub const CONTENT_MATERIAL: u32 = 0;
 /// A dictionary that materials name by digest.
 pub const CONTENT_DICTIONARY: u32 = 1;
-/// The sparse ensemble, chapter 10.
-pub const METHOD_SPARSE_ENSEMBLE: u32 = 1;
+pub use crate::material::{METHOD_SPARSE_ENSEMBLE, METHOD_SPARSE_TENSOR};
 
 /// The fields of a header.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -30,7 +29,7 @@ pub struct Header {
     pub file_length: u32,
     /// [`CONTENT_MATERIAL`] or [`CONTENT_DICTIONARY`].
     pub content: u32,
-    /// [`METHOD_SPARSE_ENSEMBLE`].
+    /// [`METHOD_SPARSE_ENSEMBLE`] or [`METHOD_SPARSE_TENSOR`].
     pub method: u32,
     /// Entries of the directory.
     pub section_count: u32,
@@ -66,6 +65,11 @@ impl Header {
     /// Whether channel `c` has texture.
     pub fn is_full(&self, c: u32) -> bool {
         self.states.get(c as usize).is_some_and(|&state| state == CHANNEL_FULL)
+    }
+
+    /// Whether any channel has texture.
+    pub fn has_texture(&self) -> bool {
+        self.states.contains(&CHANNEL_FULL)
     }
 
     /// Reads the fields of a header that is long enough; nothing is checked.
@@ -130,7 +134,9 @@ pub(crate) fn check_header(check: &mut Check<'_, '_>, limits: &Limits) -> Option
     let known_content = header.content == CONTENT_MATERIAL || header.content == CONTENT_DICTIONARY;
     let wanted = if check.part == Part::Dictionary { header.content == CONTENT_DICTIONARY } else { known_content };
     let mut sound = check.ensure(wanted, Rule::Content, 16, header.content);
-    let known = cfg!(feature = "sparse-ensemble") && header.method == METHOD_SPARSE_ENSEMBLE;
+    let of_ensemble = cfg!(feature = "sparse-ensemble") && header.method == METHOD_SPARSE_ENSEMBLE;
+    let of_tensor = cfg!(feature = "sparse-tensor") && header.method == METHOD_SPARSE_TENSOR;
+    let known = of_ensemble || of_tensor;
     sound &= check.ensure(known, Rule::Method, 20, header.method);
     for (offset, size) in [(32, header.width), (36, header.height)] {
         sound &= check.ensure((1..=16_384).contains(&size), Rule::ImageSize, offset, size);
@@ -142,7 +148,9 @@ pub(crate) fn check_header(check: &mut Check<'_, '_>, limits: &Limits) -> Option
     let larger = header.width.max(header.height).min(16_384);
     let needed = header.level_count == 1 || in_range && level_size(larger, header.level_count.wrapping_sub(2)) > 1;
     sound &= check.ensure(in_range && needed, Rule::LevelCount, 48, header.level_count);
-    sound &= check.ensure((1..=16).contains(&header.edge), Rule::BlockEdge, 52, header.edge);
+    // A sparse tensor has no blocks: each texel is one.
+    let largest_edge = if header.method == METHOD_SPARSE_TENSOR { 1 } else { 16 };
+    sound &= check.ensure((1..=largest_edge).contains(&header.edge), Rule::BlockEdge, 52, header.edge);
     sound &= check.ensure((1..=8).contains(&header.layer_count), Rule::LayerCount, 53, header.layer_count);
     for (c, &state) in (0u32..).zip(&header.states) {
         sound &= check.ensure(state <= CHANNEL_FULL, Rule::ChannelState, 56u32.wrapping_add(c), state);

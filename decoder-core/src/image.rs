@@ -9,10 +9,11 @@ use crate::direction::{Direction, Taps};
 use crate::ensemble::{RECORD_BOUND, Record};
 use crate::fixed::{HALF_Q15, clamp_magnitude, multiply_q15, round_shift};
 use crate::interpolation::{VALUE_BOUND, mean_q20, radiance, scale_q15, scale_texture};
-use crate::material::{CHANNEL_FULL, CHANNEL_MISSING, Channel, level_size};
+use crate::material::{CHANNEL_FULL, CHANNEL_MISSING, Channel, METHOD_SPARSE_TENSOR, level_size};
 use crate::open::Selvedge;
 use crate::records::{Blend, Table, atoms_of, entry, for_each_coefficient, record_of};
 use crate::result::BufferTooSmall;
+use crate::tensor_paths;
 use crate::words::word;
 
 /// Texels along the side of the largest block.
@@ -29,6 +30,9 @@ impl Selvedge<'_> {
 
     /// Words of scratch that [`Selvedge::decode_image`] and [`Selvedge::decode_channel`] need.
     pub fn image_scratch_len(&self) -> usize {
+        if self.material().method == METHOD_SPARSE_TENSOR {
+            return if self.material().full_count > 0 { tensor_paths::image_scratch_len(self) } else { 0 };
+        }
         self.material().channels.iter().map(|channel| self.atom_total(*channel)).max().unwrap_or(0)
     }
 
@@ -133,6 +137,14 @@ impl Selvedge<'_> {
         let scaled = channel.scale_start != 0;
         let scale = if scaled { scale_q15(words, material, channel, light, view) } else { 0 };
         let shift = if scaled { word(words, channel.scale_start.wrapping_add(1)) } else { 0 };
+        let value = |texture: i32| {
+            let texture = if scaled { scale_texture(texture, scale, shift) } else { texture };
+            clamp_magnitude(texture.wrapping_add(mean), VALUE_BOUND)
+        };
+        if material.method == METHOD_SPARSE_TENSOR {
+            tensor_paths::image_textures(self, number, level, light, view, scratch, |at, texture| put(at, value(texture)));
+            return;
+        }
         self.angular_products(channel, light, view, scratch);
         let edge = material.edge;
         let blocks_x = width.div_ceil(edge.max(1));
@@ -150,8 +162,7 @@ impl Selvedge<'_> {
                 for (y, row) in (y0..height.min(y0.wrapping_add(edge))).zip(&sums) {
                     let at = (y as usize).wrapping_mul(width as usize).wrapping_add(x0 as usize);
                     for (x, &texture) in (x0..width.min(x0.wrapping_add(edge))).zip(row) {
-                        let texture = if scaled { scale_texture(texture, scale, shift) } else { texture };
-                        put(at.wrapping_add(x.wrapping_sub(x0) as usize), clamp_magnitude(texture.wrapping_add(mean), VALUE_BOUND));
+                        put(at.wrapping_add(x.wrapping_sub(x0) as usize), value(texture));
                     }
                 }
             }

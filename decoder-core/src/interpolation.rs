@@ -1,17 +1,22 @@
 //! Interpolation in the model (chapter 8) and levels (chapter 9). Twin: `shaders/wgsl/interpolation.wgsl`.
 //!
 //! What every method shares: means and scales for pairs of directions, the value of a channel, and the
-//! samples that a caller can ask for. The method adds the texture: `texture_q20`.
+//! samples that a caller can ask for. The method adds the texture: `texture_q20` of a channel, or
+//! `textures_q20` of all at once.
 
 use crate::colour::{Rgb, Values, colour};
 use crate::direction::{Direction, Taps, locate, single_tap};
 #[cfg(feature = "sparse-ensemble")]
 use crate::ensemble::texture_q20;
 use crate::fixed::{clamp_magnitude, multiply_q15, round_shift};
-use crate::material::{CHANNEL_FULL, CHANNEL_MISSING, Channel, Material, level_size};
+use crate::material::{CHANNEL_FULL, CHANNEL_MISSING, Channel, METHOD_SPARSE_TENSOR, Material, level_size};
 #[cfg(not(feature = "sparse-ensemble"))]
-use crate::no_method::texture_q20;
+use crate::no_ensemble::texture_q20;
+#[cfg(not(feature = "sparse-tensor"))]
+use crate::no_tensor::textures_q20;
 use crate::position::{Axis, axis_at_position, axis_at_texel};
+#[cfg(feature = "sparse-tensor")]
+use crate::tensor::textures_q20;
 use crate::words::{Words, packed_i16, word};
 
 /// Channel values are limited to this magnitude, Q20: 128 (8.1-4).
@@ -62,8 +67,8 @@ pub fn scale_texture(texture: i32, scale: i32, shift: u32) -> i32 {
     clamp_magnitude(multiply_q15(texture, scale), VALUE_BOUND >> shift) << shift
 }
 
-/// The value of a channel at one level, Q20 (8.3).
-pub fn channel_q20(words: Words<'_>, material: &Material, channel: Channel, level: u32, x: Axis, y: Axis, light: Taps, view: Taps) -> i32 {
+/// The value of a channel at one level, Q20 (8.3); `given` is its texture where the method gives those of all channels at once.
+pub fn channel_q20(words: Words<'_>, material: &Material, channel: Channel, given: i32, level: u32, x: Axis, y: Axis, light: Taps, view: Taps) -> i32 {
     // 8.3-1: a missing channel is zero.
     if channel.state == CHANNEL_MISSING {
         return 0;
@@ -73,7 +78,11 @@ pub fn channel_q20(words: Words<'_>, material: &Material, channel: Channel, leve
     if channel.state != CHANNEL_FULL {
         return clamp_magnitude(mean, VALUE_BOUND);
     }
-    let mut texture = texture_q20(words, material, channel, level, x, y, light, view);
+    let mut texture = given;
+    // 8.3-3: a sparse ensemble gives each channel's texture by itself.
+    if material.method != METHOD_SPARSE_TENSOR {
+        texture = texture_q20(words, material, channel, level, x, y, light, view);
+    }
     // 8.2-3: a channel without scales keeps its texture.
     if channel.scale_start != 0 {
         let scale = scale_q15(words, material, channel, light, view);
@@ -98,9 +107,20 @@ pub fn channel_of(material: &Material, number: u32) -> Channel {
 /// The values of all channels at one level (8.3).
 pub fn level_values(words: Words<'_>, material: &Material, level: u32, x: Axis, y: Axis, light: Taps, view: Taps) -> Values {
     let mut values = Values { c0: 0, c1: 0, c2: 0 };
+    // 8.3-3: a sparse tensor gives the textures of all channels at once.
+    if material.method == METHOD_SPARSE_TENSOR && material.full_count != 0 {
+        values = textures_q20(words, material, level, x, y, light, view);
+    }
     // 8.3-4: a loop, so that a compiler for GPUs makes one copy of a channel.
     for number in 0..3u32 {
-        let value = channel_q20(words, material, channel_of(material, number), level, x, y, light, view);
+        let mut given = values.c0;
+        if number == 1 {
+            given = values.c1;
+        }
+        if number == 2 {
+            given = values.c2;
+        }
+        let value = channel_q20(words, material, channel_of(material, number), given, level, x, y, light, view);
         if number == 0 {
             values.c0 = value;
         }

@@ -32,6 +32,7 @@
 //! | 8, 9 interpolation, levels | [`interpolation`]*, [`pair_table`] |
 //! | 10 sparse ensemble | `ensemble`*, `ensemble_set` |
 //! | 11 results and digest | [`result`] |
+//! | 12 sparse tensor | `tensor`*, `tensor_set` |
 //! | all of them together | `open`, and the fast paths `batch` and `image` |
 
 #![no_std]
@@ -65,7 +66,9 @@ pub mod limits;
 pub mod material;
 pub mod metadata;
 #[cfg(not(feature = "sparse-ensemble"))]
-mod no_method;
+mod no_ensemble;
+#[cfg(not(feature = "sparse-tensor"))]
+mod no_tensor;
 mod open;
 pub mod pair_table;
 pub mod position;
@@ -73,8 +76,14 @@ pub mod position;
 mod records;
 pub mod result;
 mod sha256;
-#[cfg(feature = "sparse-ensemble")]
+#[cfg(any(feature = "sparse-ensemble", feature = "sparse-tensor"))]
 pub mod stream;
+#[cfg(feature = "sparse-tensor")]
+pub mod tensor;
+#[cfg(feature = "batch")]
+mod tensor_paths;
+#[cfg(feature = "sparse-tensor")]
+pub mod tensor_set;
 pub mod words;
 
 #[cfg(feature = "batch")]

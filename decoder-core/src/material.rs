@@ -9,6 +9,10 @@ pub const CHANNEL_MISSING: u32 = 0;
 pub const CHANNEL_MEAN: u32 = 1;
 /// A channel with texture.
 pub const CHANNEL_FULL: u32 = 2;
+/// The sparse ensemble, chapter 10.
+pub const METHOD_SPARSE_ENSEMBLE: u32 = 1;
+/// The sparse tensor, chapter 12.
+pub const METHOD_SPARSE_TENSOR: u32 = 2;
 /// Channels are base-two logarithms of radiance plus an offset.
 pub const TRANSFER_LOG2: u32 = 0;
 /// Channels are linear.
@@ -74,14 +78,20 @@ pub struct Material {
     pub layer_limit: u32,
     /// Channels with texture.
     pub full_count: u32,
-    /// Word number of the first directory entry of the coefficients.
+    /// Word number of the first directory entry of the coefficients, or of the lists.
     pub coefficient_entry: u32,
+    /// [`METHOD_SPARSE_ENSEMBLE`] or [`METHOD_SPARSE_TENSOR`].
+    pub method: u32,
+    /// First word of the light atoms of a sparse tensor.
+    pub light_atoms_start: u32,
+    /// First word of the fibres of a sparse tensor.
+    pub fibres_start: u32,
     /// The three channels.
     pub channels: [Channel; 3],
 }
 
 /// Words in a [`Material`].
-pub const MATERIAL_WORDS: usize = 48;
+pub const MATERIAL_WORDS: usize = 51;
 
 impl Material {
     /// The record's words in the order of its fields, for a kernel's table of materials.
@@ -103,8 +113,9 @@ impl Material {
             self.exponent as u32,
         ];
         let tail = [self.edge, self.edge_reciprocal_q18, self.layer_count, self.layer_limit, self.full_count, self.coefficient_entry];
+        let tensor = [self.method, self.light_atoms_start, self.fibres_start];
         let mut words = [0; MATERIAL_WORDS];
-        let fields = head.into_iter().chain(m.map(|entry| entry as u32)).chain(tail).chain(c0).chain(c1).chain(c2);
+        let fields = head.into_iter().chain(m.map(|entry| entry as u32)).chain(tail).chain(tensor).chain(c0).chain(c1).chain(c2);
         words.iter_mut().zip(fields).for_each(|(word, field)| *word = field);
         words
     }

@@ -7,17 +7,19 @@ use crate::direction::{Direction, Taps, sample_direction};
 use crate::direction_set::{check_directions, largest_candidates};
 use crate::directory::{DIRECTIONS, EXTERNAL, MEANS, METADATA, SCALES, SPATIAL, check_directory, find_in, find_section, read_entry};
 #[cfg(feature = "sparse-ensemble")]
-use crate::ensemble_set::{check_method, check_method_dictionary};
+use crate::ensemble_set::{check_ensemble, check_ensemble_dictionary};
 use crate::error::{Finding, First, Part, Rule, Sink};
 use crate::header::{CONTENT_DICTIONARY, CONTENT_MATERIAL, Header, check_header};
 use crate::interpolation::{filtered_values, locate_light, locate_view, point_values, radiance, trilinear_values};
 use crate::limits::Limits;
-use crate::material::{CHANNEL_FULL, Channel, Material, TRANSFER_LOG2};
+#[cfg(feature = "sparse-tensor")]
+use crate::material::METHOD_SPARSE_TENSOR;
+use crate::material::{CHANNEL_FULL, Channel, METHOD_SPARSE_ENSEMBLE, Material, TRANSFER_LOG2};
 use crate::metadata::{Metadata, check_external, check_metadata, read_metadata};
-#[cfg(not(feature = "sparse-ensemble"))]
-use crate::no_method::{check_method, check_method_dictionary};
 use crate::pair_table::check_pair_table;
 use crate::sha256::sha256;
+#[cfg(feature = "sparse-tensor")]
+use crate::tensor_set::{check_tensor, check_tensor_dictionary};
 use crate::words::{Words, word};
 
 /// An open material. Copies are cheap: it borrows the file's bytes and owns nothing.
@@ -129,16 +131,40 @@ fn check_material<'a>(bytes: &'a [u8], dictionary: Option<&'a [u8]>, limits: &Li
             }
         }
     }
-    let records = check_method(check, &header, external.as_ref(), &mut material)?;
+    let textures = check_method(check, &header, external.as_ref(), &mut material)?;
     if !sound || check.stopped {
         return None;
     }
     let sets = [light, view].map(|section| largest_candidates(check, section));
     let means = header.states.iter().filter(|&&state| state != 0).count() as u32;
     let shape = Shape { candidates: sets.map(|set| set.0), hull_counts: sets.map(|set| set.1), means, scales: scaled };
-    let operations = filtered_operations(shape, records);
+    let operations = filtered_operations(shape, textures);
     check.ensure(operations == header.operations, Rule::StatedOperations, 28, header.operations);
     check.clean.then_some(Selvedge { words, header, material })
+}
+
+/// Walks the chapter of the material's method; a method that this build does not have was refused with the header.
+#[allow(unused_variables, reason = "a build may have no method")]
+fn check_method(check: &mut Check<'_, '_>, header: &Header, external: Option<&Header>, material: &mut Material) -> Option<u64> {
+    match header.method {
+        #[cfg(feature = "sparse-ensemble")]
+        METHOD_SPARSE_ENSEMBLE => check_ensemble(check, header, external, material),
+        #[cfg(feature = "sparse-tensor")]
+        METHOD_SPARSE_TENSOR => check_tensor(check, header, external, material),
+        _ => None,
+    }
+}
+
+/// Walks the chapter of a dictionary's method.
+#[allow(unused_variables, reason = "a build may have no method")]
+fn check_method_dictionary(check: &mut Check<'_, '_>, header: &Header) -> Option<()> {
+    match header.method {
+        #[cfg(feature = "sparse-ensemble")]
+        METHOD_SPARSE_ENSEMBLE => check_ensemble_dictionary(check, header),
+        #[cfg(feature = "sparse-tensor")]
+        METHOD_SPARSE_TENSOR => check_tensor_dictionary(check, header),
+        _ => None,
+    }
 }
 
 /// Walks 3.5. `Some(None)` is a material without an external dictionary.
@@ -163,7 +189,8 @@ fn walk_external(check: &mut Check<'_, '_>, header: &Header, dictionary: Option<
     let serves = (0..3).all(|c| !header.is_full(c) || other.is_full(c));
     let fits = other.method == header.method && other.light_count == header.light_count && other.view_count == header.view_count && serves;
     // Spatial factors that the material does not have must be there, and for its edge.
-    let lacks = [0, 1, 2].map(|c| header.is_full(c) && find_section(check, header, SPATIAL, c).is_none());
+    let has_blocks = header.method == METHOD_SPARSE_ENSEMBLE;
+    let lacks = [0, 1, 2].map(|c| has_blocks && header.is_full(c) && find_section(check, header, SPATIAL, c).is_none());
     let there = check.in_dictionary(|inner| (0u32..).zip(lacks).all(|(c, lacks)| !lacks || find_section(inner, &other, SPATIAL, c).is_some()));
     let fits = fits && there && (!lacks.contains(&true) || other.edge == header.edge);
     check.ensure(fits, Rule::ExternalFit, section.offset, other.edge).then_some(Some(other))
@@ -197,6 +224,7 @@ fn describe(header: &Header) -> Material {
         layer_count: header.layer_count,
         layer_limit: header.layer_count,
         full_count,
+        method: header.method,
         channels,
         ..Material::default()
     }
@@ -248,9 +276,14 @@ impl<'a> Selvedge<'a> {
         material.light_start = place(material.light_start);
         material.view_start = place(material.view_start);
         material.coefficient_entry = place(material.coefficient_entry);
+        // Zero says that there is none; no section begins in the header.
+        for start in [&mut material.light_atoms_start, &mut material.fibres_start] {
+            if *start != 0 {
+                *start = place(*start);
+            }
+        }
         for channel in &mut material.channels {
             for start in [&mut channel.mean_start, &mut channel.scale_start, &mut channel.angular_start, &mut channel.spatial_start, &mut channel.atoms_start] {
-                // Zero says that there is none; no section begins in the header.
                 if *start != 0 {
                     *start = place(*start);
                 }

@@ -57,6 +57,13 @@ pub fn bit_window(words: Words<'_>, start: u32, bit: u32) -> u32 {
     (word(words, index) >> shift) | ((word(words, index.wrapping_add(1)) << 1) << (31 - shift))
 }
 
+/// `count` low bits of a window, for `count <= 31` (10.4-1).
+#[inline(always)]
+pub fn low_part(window: u32, count: u32) -> u32 {
+    // 10.4-1: a mask by shift; the count never reaches 32.
+    window & ((1u32 << count).wrapping_sub(1))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

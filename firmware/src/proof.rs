@@ -14,7 +14,7 @@ use core::fmt::Write;
 use core::hint::black_box;
 use machine::end;
 use selvedge::{Direction, Finding, First, Limits, Part, Rule, Selvedge, Sha256, Sink, Taps, Values};
-use selvedge::{colour, cost, direction, direction_set, ensemble, fixed, interpolation, material, position, result, stream, words};
+use selvedge::{colour, cost, direction, direction_set, ensemble, fixed, interpolation, material, position, result, stream, tensor, words};
 
 /// A value that the compiler knows nothing of.
 #[inline(always)]
@@ -61,6 +61,7 @@ pub fn start() -> ! {
     containers();
     kernel(files);
     method(files);
+    second_method(files);
     #[cfg(feature = "planted")]
     black_box([1, 2, 3][any(5usize)]);
     end(true)
@@ -87,7 +88,8 @@ fn containers() {
             Err(finding) => tell(finding),
         }
     }
-    black_box(selvedge::Header::read(|at| at ^ n()).is_full(n()));
+    let header = selvedge::Header::read(|at| at ^ n());
+    black_box((header.is_full(n()), header.has_texture()));
     let mut hash = any(Sha256Parts(bytes(), bytes())).hash();
     hash.update(bytes());
     black_box((hash.finish(), selvedge::sha256(bytes()), selvedge::crc32(n(), bytes()), count));
@@ -178,14 +180,14 @@ fn kernel(files: words::Words<'_>) {
     let axis = any(position::Axis::default());
     black_box((interpolation::blend_table_q15(files, n(), n(), taps, taps), interpolation::blend_row(files, n(), taps)));
     black_box((interpolation::mean_q20(files, &one, channel, taps, taps), interpolation::scale_q15(files, &one, channel, taps, taps)));
-    black_box((interpolation::scale_texture(i(), i(), n()), interpolation::channel_q20(files, &one, channel, n(), axis, axis, taps, taps)));
+    black_box((interpolation::scale_texture(i(), i(), n()), interpolation::channel_q20(files, &one, channel, i(), n(), axis, axis, taps, taps)));
     black_box((interpolation::channel_of(&one, n()), interpolation::level_values(files, &one, n(), axis, axis, taps, taps)));
     black_box((interpolation::filtered_values(files, &one, n(), n(), n(), taps, taps), interpolation::between(i(), i(), i())));
     black_box((interpolation::trilinear_values(files, &one, n(), n(), n(), taps, taps), interpolation::point_values(files, &one, n(), n(), n(), n())));
     black_box(interpolation::texel_values(files, &one, n(), n(), taps, taps));
     black_box((interpolation::locate_light(files, &one, any_direction()), interpolation::locate_view(files, &one, any_direction())));
     black_box((interpolation::radiance(&one, values, taps), result::next_query_word(&mut n())));
-    black_box((cost::record_operations(n(), n()), cost::filtered_operations(any(cost::Shape::default()), any(0))));
+    black_box((cost::record_operations(n(), n()), cost::layer_operations(n(), n(), n()), cost::filtered_operations(any(cost::Shape::default()), any(0))));
 }
 
 /// Chapter 10, and the fast way through its streams.
@@ -193,13 +195,24 @@ fn method(files: words::Words<'_>) {
     let (taps, span, axis) = (any(Taps::default()), any(position::Span::default()), any(position::Axis::default()));
     let (one, channel) = (any(material::Material::default()), any(material::Channel::default()));
     let record = any(ensemble::Record::default());
-    black_box((ensemble::low_part(n(), n()), ensemble::coefficients_start(files, &one, channel, n(), n()), ensemble::read_record(files, n(), n())));
+    black_box((words::low_part(n(), n()), ensemble::coefficients_start(files, &one, channel, n(), n()), ensemble::read_record(files, n(), n())));
     black_box((ensemble::dequantise(n(), n(), n()), ensemble::blend_column(files, n(), n(), taps, n()), ensemble::blend_span(files, n(), n(), span, n())));
     black_box(ensemble::record_q20(files, channel, record, span, span, taps, taps));
     black_box(ensemble::block_q20(files, &one, channel, n(), span, span, taps, taps));
     black_box(ensemble::texture_q20(files, &one, channel, n(), axis, axis, taps, taps));
     let mut ones = stream::Ones::new(bytes(), n(), n());
     black_box((stream::window(bytes(), n()), ones.take(), ones.take()));
+}
+
+/// Chapter 12.
+fn second_method(files: words::Words<'_>) {
+    let (taps, axis) = (any(Taps::default()), any(position::Axis::default()));
+    let (one, list) = (any(material::Material::default()), any(tensor::List::default()));
+    black_box((tensor::bit_length(n()), tensor::list_low_bits(n(), n()), tensor::list_bits(n(), n(), n(), n()), tensor::list_coefficient(n(), n())));
+    black_box((tensor::lists_start(files, &one, n(), n()), tensor::next_coefficient(files, list), tensor::open_list(files, n(), n(), n()), tensor::no_list()));
+    black_box((tensor::light_entry(n(), n()), tensor::blend_light(n(), n(), n(), taps, n()), tensor::corner_weight(i(), i(), i())));
+    black_box((tensor::add_fibre(files, &one, n(), n(), i(), taps, any(Values::default())), tensor::angular_q15(files, &one, n(), n(), taps, taps)));
+    black_box((tensor::layer_q20(files, &one, n(), n(), axis, axis, taps, taps), tensor::textures_q20(files, &one, n(), axis, axis, taps, taps)));
 }
 
 #[cfg(feature = "proof")]

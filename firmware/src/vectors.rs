@@ -124,9 +124,12 @@ mod measure {
         for (name, file) in [(&b"example"[..], MATERIAL), (b"excerpt", LARGER)] {
             let open = || selvedge::open(core::hint::black_box(file), &Limits::NONE);
             super::write(name);
-            tell(b": stack of open ", depth(&mut || {
-                let _ = core::hint::black_box(open());
-            }));
+            tell(
+                b": stack of open ",
+                depth(&mut || {
+                    let _ = core::hint::black_box(open());
+                }),
+            );
             let Ok(material) = open() else { continue };
             let mut sum = 0;
             tell(b"  stack of a filtered sample ", depth(&mut || sum ^= sample(core::hint::black_box(&material), 3)));

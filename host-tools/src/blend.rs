@@ -108,10 +108,11 @@ pub fn blend(a: &MaterialModel, b: &MaterialModel, alpha: f64, options: Blend) -
 /// Refuses two materials that have no common space.
 fn agree(a: &MaterialModel, b: &MaterialModel, options: Blend) -> Result<()> {
     let kind = |model: &MaterialModel| matches!(model.transfer, TransferModel::Linear { .. });
-    let states = |model: &MaterialModel| model.channels.each_ref().map(ChannelModel::state);
+    let states = |model: &MaterialModel| [0, 1, 2].map(|c| model.state(c));
     let scales = |model: &MaterialModel| model.channels.each_ref().map(|channel| channel.scale.is_some());
     let same_scales = a.channels.iter().zip(&b.channels).all(|(a, b)| a.scale == b.scale);
     let rules = [
+        (a.tensor.is_none() && b.tensor.is_none(), "methods: both must be sparse ensembles"),
         (a.size == b.size, "image sizes: both must have the same width and height"),
         (a.edge == b.edge, "block edges: encode both with the same"),
         (a.level_count == b.level_count, "numbers of levels: trim the one that has more"),

@@ -86,6 +86,7 @@ pub fn to_bytes(trained: &Trained, training: &Training, metadata: MetadataModel)
         lights: project_all(&training.lights),
         views: (training.views != training.lights).then(|| project_all(&training.views)),
         channels: trained.ensembles.each_ref().map(channel),
+        tensor: None,
         extras: vec![(TRAINING, 0, json)],
     };
     write_dictionary(&model)

@@ -3,12 +3,13 @@
 //! Results are the core's, bit for bit. What a single coefficient gives is told in floats, since the decoder rounds sums and not
 //! single terms; `rounding` is the difference.
 
-use crate::read::record_coefficients;
+use crate::read::{list, record_coefficients};
 use selvedge::direction::{Direction, Taps};
 use selvedge::ensemble::{blend_column, blend_span, coefficients_start, dequantise, read_record, record_q20};
 use selvedge::interpolation::{channel_q20, mean_q20, radiance, scale_q15, texel_values};
-use selvedge::material::{CHANNEL_FULL, CHANNEL_MISSING, Channel};
+use selvedge::material::{CHANNEL_FULL, CHANNEL_MISSING, Channel, METHOD_SPARSE_TENSOR};
 use selvedge::position::{Axis, axis_at_texel, block_count};
+use selvedge::tensor::{angular_q15, layer_q20, list_coefficient, lists_start, textures_q20};
 use selvedge::words::word;
 use selvedge::{Selvedge, colour::Values};
 use serde::Serialize;
@@ -71,6 +72,36 @@ pub struct ChannelReport {
     pub value_q20: i32,
 }
 
+/// One ABRDF atom of a sparse tensor and what it gave.
+#[derive(Clone, Debug, Serialize)]
+pub struct AbrdfTerm {
+    /// Its number.
+    pub atom: u32,
+    /// Right shift of its products.
+    pub gain_shift: u32,
+    /// The coefficient, Q15.
+    pub coefficient: i32,
+    /// The atom for these directions, Q15, in each channel.
+    pub angular_q15: [i32; 3],
+    /// What it adds to each texture, in units of the channel.
+    pub adds: [f64; 3],
+}
+
+/// The list of the texel in one layer of a sparse tensor.
+#[derive(Clone, Debug, Serialize)]
+pub struct ListReport {
+    /// Quality layer.
+    pub layer: u32,
+    /// Right shift of its totals.
+    pub shift: u32,
+    /// What it adds to the textures, as decoded, in units of the channel.
+    pub adds: [f64; 3],
+    /// That, less the sum of its terms: rounding and limits.
+    pub rounding: [f64; 3],
+    /// Its terms, the largest first.
+    pub terms: Vec<AbrdfTerm>,
+}
+
 /// A sample taken apart.
 #[derive(Clone, Debug, Serialize)]
 pub struct Explanation {
@@ -86,6 +117,8 @@ pub struct Explanation {
     pub view: Vec<(u32, f64)>,
     /// The channels.
     pub channels: Vec<ChannelReport>,
+    /// The texel's lists, of a sparse tensor.
+    pub lists: Vec<ListReport>,
     /// Linear radiance, as decoded.
     pub radiance: [f32; 3],
 }
@@ -102,7 +135,12 @@ pub fn explain(opened: &Selvedge<'_>, texel: [u32; 2], light: Direction, view: D
     let axis = |at: u32| axis_at_texel(material.edge, material.edge_reciprocal_q18, at);
     let [x, y] = texel.map(axis);
     let (light, view) = (opened.locate_light(light), opened.locate_view(view));
-    let channels = material.channels.iter().map(|channel| channel_report(opened, *channel, x, y, light, view)).collect();
+    let textured = material.method == METHOD_SPARSE_TENSOR && material.full_count > 0;
+    let given = if textured { textures_q20(words, material, 0, x, y, light, view) } else { Values::default() };
+    let given = [given.c0, given.c1, given.c2];
+    let channels = material.channels.iter().zip(given).map(|(channel, given)| channel_report(opened, *channel, given, x, y, light, view)).collect();
+    let layers = if textured { material.layer_limit } else { 0 };
+    let lists = (0..layers).map(|layer| list_report(opened, layer, x, y, light, view)).collect();
     let values: Values = texel_values(words, material, texel[0], texel[1], light, view);
     Explanation {
         texel,
@@ -111,17 +149,18 @@ pub fn explain(opened: &Selvedge<'_>, texel: [u32; 2], light: Direction, view: D
         light: tap_list(light),
         view: tap_list(view),
         channels,
+        lists,
         radiance: radiance(material, values, light).to_f32(),
     }
 }
 
-fn channel_report(opened: &Selvedge<'_>, channel: Channel, x: Axis, y: Axis, light: Taps, view: Taps) -> ChannelReport {
+fn channel_report(opened: &Selvedge<'_>, channel: Channel, given: i32, x: Axis, y: Axis, light: Taps, view: Taps) -> ChannelReport {
     let (material, words) = (opened.material(), opened.words());
-    let value_q20 = channel_q20(words, material, channel, 0, x, y, light, view);
+    let value_q20 = channel_q20(words, material, channel, given, 0, x, y, light, view);
     let mean = if channel.state == CHANNEL_MISSING { 0.0 } else { mean_q20(words, material, channel, light, view) as f64 / ONE_Q20 };
     let scaled = channel.state == CHANNEL_FULL && channel.scale_start != 0;
     let gain = |scale_q15: i32| scale_q15 as f64 / 32768.0 * 2f64.powi(word(words, channel.scale_start + 1) as i32);
-    let records = if channel.state == CHANNEL_FULL {
+    let records = if channel.state == CHANNEL_FULL && material.method != METHOD_SPARSE_TENSOR {
         (0..material.layer_limit).filter_map(|layer| record_report(opened, channel, layer, x, y, light, view)).collect()
     } else {
         Vec::new()
@@ -172,6 +211,29 @@ fn record_report(opened: &Selvedge<'_>, channel: Channel, layer: u32, x: Axis, y
     Some(RecordReport { layer, dictionary: record.dictionary, shift: record.shift, count: record.count, adds, rounding, terms })
 }
 
+fn list_report(opened: &Selvedge<'_>, layer: u32, x: Axis, y: Axis, light: Taps, view: Taps) -> ListReport {
+    let (material, words) = (opened.material(), opened.words());
+    let start = lists_start(words, material, 0, layer);
+    let (value_bits, shift) = (word(words, start) & 0xff, word(words, start) >> 24);
+    let texel = y.first.block * material.width + x.first.block;
+    let term = |(atom, value): (u32, u16)| {
+        let shifts = word(words, material.fibres_start + 2 + atom);
+        let angular = angular_q15(words, material, atom, shifts & 31, light, view);
+        let (angular_q15, gain_shift) = ([angular.c0, angular.c1, angular.c2], shifts >> 5 & 31);
+        let coefficient = list_coefficient(value as u32, value_bits);
+        // 12.5 without its roundings: Q15 times Q15, then both shifts, to Q20.
+        let unit = 2f64.powi(-((gain_shift + shift) as i32)) / ONE_Q20;
+        AbrdfTerm { atom, gain_shift, coefficient, angular_q15, adds: angular_q15.map(|u| coefficient as f64 * u as f64 * unit) }
+    };
+    let mut terms: Vec<AbrdfTerm> = list(words, start, word(words, material.fibres_start), texel).into_iter().map(term).collect();
+    let decoded = layer_q20(words, material, 0, layer, x, y, light, view);
+    let adds = [decoded.c0, decoded.c1, decoded.c2].map(|q20| q20 as f64 / ONE_Q20);
+    let rounding = std::array::from_fn(|c| adds[c] - terms.iter().map(|term| term.adds[c]).sum::<f64>());
+    let size = |term: &AbrdfTerm| term.adds.iter().map(|a| a.abs()).sum::<f64>();
+    terms.sort_by(|a, b| size(b).total_cmp(&size(a)).then(a.atom.cmp(&b.atom)));
+    ListReport { layer, shift, adds, rounding, terms }
+}
+
 /// For people, at most `most` terms of a record.
 pub fn text(e: &Explanation, most: usize) -> String {
     let taps = |taps: &[(u32, f64)]| taps.iter().map(|(i, weight)| format!("{i} x {weight:.4}")).collect::<Vec<_>>().join(", ");
@@ -205,6 +267,16 @@ pub fn text(e: &Explanation, most: usize) -> String {
             }
         }
     }
+    let three = |values: [f64; 3]| values.map(|value| format!("{value:+.6}")).join(" ");
+    for list in &e.lists {
+        text += &format!("layer {}: {} ABRDF atoms add {}\n", list.layer, list.terms.len(), three(list.adds));
+        for term in list.terms.iter().take(most) {
+            text += &format!("    {}  atom {}, coefficient {}\n", three(term.adds), term.atom, term.coefficient);
+        }
+        if list.terms.len() > most {
+            text += &format!("    and {} more\n", list.terms.len() - most);
+        }
+    }
     text
 }
 
@@ -212,7 +284,7 @@ pub fn text(e: &Explanation, most: usize) -> String {
 mod tests {
     use super::*;
     use crate::example::example_model;
-    use crate::extreme::extreme_model;
+    use crate::extreme::extreme_of_any_method;
     use crate::random::Random;
     use crate::write::write_material;
     use selvedge::Limits;
@@ -223,7 +295,7 @@ mod tests {
         let mut random = Random::new(8);
         let mut terms = 0;
         for seed in 0..40 {
-            let file = write_material(&if seed == 0 { example_model() } else { extreme_model(seed) });
+            let file = write_material(&if seed == 0 { example_model() } else { extreme_of_any_method(seed) });
             let opened = selvedge::open(&file, &Limits::NONE).expect("legal");
             let header = opened.header();
             for _ in 0..20 {

@@ -1,7 +1,8 @@
 //! What `info` tells: the same facts as text and as JSON.
 
 use selvedge::Selvedge;
-use selvedge::directory::{ANGULAR, ATOMS, COEFFICIENTS, DIRECTIONS, EXTERNAL, MEANS, METADATA, OPTIONAL, SCALES, SPATIAL};
+use selvedge::directory::{ANGULAR, ATOMS, COEFFICIENTS, DIRECTIONS, EXTERNAL, FIBRES, LIGHT_ATOMS, LISTS, MEANS, METADATA, OPTIONAL, SCALES, SPATIAL};
+use selvedge::header::METHOD_SPARSE_TENSOR;
 use serde::Serialize;
 
 /// Whether bytes are those of a dictionary file.
@@ -33,6 +34,8 @@ pub struct Info {
     pub licence: String,
     /// Bytes of the file.
     pub bytes: u32,
+    /// `sparse ensemble` or `sparse tensor`.
+    pub method: &'static str,
     /// Texels.
     pub size: [u32; 2],
     /// Levels of detail.
@@ -74,6 +77,9 @@ fn section_names(kind: u32, instance: u32) -> (String, String) {
         SPATIAL => channel("spatial factors"),
         ATOMS => channel("atoms"),
         COEFFICIENTS => ("coefficients".into(), format!("level {}, layer {}, channel {}", instance >> 8, instance >> 4 & 15, instance & 15)),
+        LIGHT_ATOMS => ("light atoms".into(), String::new()),
+        FIBRES => ("fibres".into(), String::new()),
+        LISTS => ("lists".into(), format!("level {}, layer {}", instance >> 8, instance >> 4 & 15)),
         _ if kind >= OPTIONAL => (format!("optional {kind:#06x}"), format!("{instance}")),
         _ => (format!("{kind:#06x}"), format!("{instance}")),
     }
@@ -87,6 +93,7 @@ pub fn info(material: &Selvedge<'_>) -> Info {
         origin: metadata.origin.into(),
         licence: metadata.licence.into(),
         bytes: header.file_length,
+        method: if header.method == METHOD_SPARSE_TENSOR { "sparse tensor" } else { "sparse ensemble" },
         size: [header.width, header.height],
         levels: header.level_count,
         layers: header.layer_count,
@@ -110,10 +117,11 @@ pub fn info(material: &Selvedge<'_>) -> Info {
 /// The same for people.
 pub fn info_text(info: &Info) -> String {
     let mut text = format!(
-        "{}\n  origin      {}\n  licence     {}\n  size        {} x {} texels, {} levels, {} layers, blocks of {} x {}\n  directions  {} light, {} view\n  channels    {}, {}, {}; {}{}\n  bytes       {}\n  operations  {} a filtered sample at worst\n  digest      {}\n",
+        "{}\n  origin      {}\n  licence     {}\n  method      {}\n  size        {} x {} texels, {} levels, {} layers, blocks of {} x {}\n  directions  {} light, {} view\n  channels    {}, {}, {}; {}{}\n  bytes       {}\n  operations  {} a filtered sample at worst\n  digest      {}\n",
         info.name,
         info.origin,
         info.licence,
+        info.method,
         info.size[0],
         info.size[1],
         info.levels,

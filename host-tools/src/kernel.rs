@@ -19,7 +19,7 @@ fn validated(source: &str) -> Result<(naga::Module, ModuleInfo)> {
 }
 
 /// The methods of this version.
-const METHODS: &[Method] = &[Method::SparseEnsemble];
+const METHODS: &[Method] = &selvedge_shaders::METHODS;
 
 /// The kernel with its entry points, as WGSL.
 pub fn source() -> String {
@@ -66,7 +66,7 @@ pub const BINDINGS: &str = "\
 Bindings of the Selvedge kernel, all in group (set, space) 0:
 
   0  read-only storage  array<u32>       the files, one behind the other, each from a word on; 4 words of zero at the end
-  1  read-only storage  array<Material>  48 words a material: Selvedge::material_at, then Material::to_words
+  1  read-only storage  array<Material>  51 words a material: Selvedge::material_at, then Material::to_words
   2  read-only storage  array<Query>     10 words a question: material, u, v, level (Q16), light[3], view[3]
   3  storage            array<Answer>    6 words an answer: binary32 bits of R, G, B, then three channel values in Q20
 

@@ -3,6 +3,8 @@
 //! Whoever makes a file (an importer, an encoder, a generator of test files) fills a [`MaterialModel`];
 //! [`crate::write`] turns it into bytes. All numbers have the meaning of the specification.
 
+use selvedge::header::{METHOD_SPARSE_ENSEMBLE, METHOD_SPARSE_TENSOR};
+use selvedge::material::CHANNEL_FULL;
 use serde::{Deserialize, Serialize};
 
 /// A whole material.
@@ -30,11 +32,30 @@ pub struct MaterialModel {
     pub views: Option<Vec<[i32; 2]>>,
     /// The channels.
     pub channels: [ChannelModel; 3],
+    /// The textures of all channels, where the method is the sparse tensor; no channel has an ensemble then.
+    pub tensor: Option<TensorModel>,
     /// Optional sections of unknown kinds: kind, instance, bytes (a multiple of four).
     pub extras: Vec<(u16, u16, Vec<u8>)>,
 }
 
 impl MaterialModel {
+    /// The method in the header.
+    pub fn method(&self) -> u32 {
+        if self.tensor.is_some() { METHOD_SPARSE_TENSOR } else { METHOD_SPARSE_ENSEMBLE }
+    }
+
+    /// The state of a channel in the header.
+    pub fn state(&self, channel: usize) -> u32 {
+        let ChannelModel { mean, ensemble, .. } = &self.channels[channel];
+        let full = ensemble.is_some() || self.tensor.as_ref().is_some_and(|tensor| tensor.channels[channel]);
+        if full { CHANNEL_FULL } else { mean.is_some() as u32 }
+    }
+
+    /// Whether any channel has texture.
+    pub fn has_texture(&self) -> bool {
+        (0..3).any(|channel| self.state(channel) == CHANNEL_FULL)
+    }
+
     /// View directions, whether or not they are stored apart.
     pub fn views(&self) -> &[[i32; 2]] {
         self.views.as_deref().unwrap_or(&self.lights)
@@ -80,17 +101,6 @@ pub struct ChannelModel {
     pub scale: Option<PairTableModel>,
     /// Texture.
     pub ensemble: Option<EnsembleModel>,
-}
-
-impl ChannelModel {
-    /// The state in the header.
-    pub fn state(&self) -> u32 {
-        match (&self.mean, &self.ensemble) {
-            (_, Some(_)) => 2,
-            (Some(_), None) => 1,
-            (None, None) => 0,
-        }
-    }
 }
 
 /// Chapters 8.1 and 8.2.
@@ -186,4 +196,43 @@ pub struct RecordModel {
     pub shift: u32,
     /// Positions in the list of atoms, ascending, with their values.
     pub coefficients: Vec<(u32, u16)>,
+}
+
+/// The sparse tensor of chapter 12.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TensorModel {
+    /// Channels that have texture.
+    pub channels: [bool; 3],
+    /// Light atoms.
+    pub light_atoms: u32,
+    /// `lights[light * light_atoms + index]`: three channels of ten bits with their sign.
+    pub lights: Vec<[i16; 3]>,
+    /// Entries of a fibre.
+    pub entries: u32,
+    /// Two shifts of each ABRDF atom.
+    pub atoms: Vec<AtomShifts>,
+    /// `fibres[(view * atoms + atom) * entries + n]`: value and index of a light atom, as the file has them.
+    pub fibres: Vec<u16>,
+    /// `lists[level][layer]`.
+    pub lists: Vec<Vec<ListsModel>>,
+}
+
+/// What an ABRDF atom is scaled by.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct AtomShifts {
+    /// Right shift of its sums over fibres.
+    pub angular: u32,
+    /// Right shift of its products with weights.
+    pub gain: u32,
+}
+
+/// The lists of one level and layer.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ListsModel {
+    /// Bits of a value.
+    pub value_bits: u32,
+    /// Right shift of the totals.
+    pub shift: u32,
+    /// Texel by texel, row by row: ABRDF atoms, ascending, with their values.
+    pub lists: Vec<Vec<(u32, u16)>>,
 }

@@ -6,16 +6,17 @@
 //! anew. Fields and the grid change no result. Triangles do: [`same_triangles`] tells.
 
 use crate::model::{
-    AtomModel, ChannelModel, CoefficientsModel, DictionaryModel, EnsembleModel, FactorModel, MaterialModel, MetadataModel, PairTableModel, RecordModel,
-    TransferModel,
+    AtomModel, AtomShifts, ChannelModel, CoefficientsModel, DictionaryModel, EnsembleModel, FactorModel, ListsModel, MaterialModel, MetadataModel,
+    PairTableModel, RecordModel, TensorModel, TransferModel,
 };
 use crate::triangulate::triangulate;
 use selvedge::direction::{hull_start, point, triangles_start};
 use selvedge::directory::OPTIONAL;
-use selvedge::ensemble::{Record, coefficients_start, low_part, read_record};
-use selvedge::material::{CHANNEL_FULL, CHANNEL_MISSING, Channel, TRANSFER_LINEAR, level_size};
+use selvedge::ensemble::{Record, coefficients_start, read_record};
+use selvedge::material::{CHANNEL_FULL, CHANNEL_MISSING, Channel, METHOD_SPARSE_TENSOR, TRANSFER_LINEAR, level_size};
 use selvedge::stream::{Ones, window};
-use selvedge::words::{Words, high_i16, low_i16, packed_i16, word};
+use selvedge::tensor::{LIST_END, light_entry, lists_start, next_coefficient, open_list};
+use selvedge::words::{Words, high_i16, low_i16, low_part, packed_i16, word};
 use selvedge::{Finding, Limits, Selvedge};
 
 /// Opens a material and takes it apart; factors of an external dictionary become the model's own.
@@ -30,6 +31,7 @@ pub fn read_model(file: &[u8], dictionary: Option<&[u8]>, limits: &Limits) -> Re
 pub fn model_of(opened: &Selvedge<'_>) -> MaterialModel {
     let (header, material, words) = (opened.header(), opened.material(), opened.words());
     let metadata = opened.metadata();
+    let is_tensor = header.method == METHOD_SPARSE_TENSOR;
     let transfer = if header.transfer == TRANSFER_LINEAR {
         TransferModel::Linear { exponent: header.transfer_parameter as i32 }
     } else {
@@ -56,8 +58,9 @@ pub fn model_of(opened: &Selvedge<'_>) -> MaterialModel {
         channels: material.channels.map(|channel| ChannelModel {
             mean: (channel.state != CHANNEL_MISSING).then(|| pair_table(opened, channel.mean_start)),
             scale: (channel.scale_start != 0).then(|| pair_table(opened, channel.scale_start)),
-            ensemble: (channel.state == CHANNEL_FULL).then(|| ensemble(opened, channel)),
+            ensemble: (channel.state == CHANNEL_FULL && !is_tensor).then(|| ensemble(opened, channel)),
         }),
+        tensor: is_tensor.then(|| tensor(opened)),
         extras: opened
             .sections()
             .filter(|section| section.kind >= OPTIONAL)
@@ -141,6 +144,56 @@ fn ensemble(opened: &Selvedge<'_>, channel: Channel) -> EnsembleModel {
         })
         .collect();
     EnsembleModel { dictionaries, atoms, coefficients }
+}
+
+fn tensor(opened: &Selvedge<'_>) -> TensorModel {
+    let (header, material, words) = (opened.header(), opened.material(), opened.words());
+    let channels = material.channels.map(|channel| channel.state == CHANNEL_FULL);
+    if !header.has_texture() {
+        return TensorModel { channels, ..TensorModel::default() };
+    }
+    let light_atoms = word(words, material.light_atoms_start);
+    let light = |n: u32| {
+        let entry = word(words, material.light_atoms_start + 2 + n);
+        [0, 1, 2].map(|c| light_entry(entry, c) as i16)
+    };
+    let (count, entries) = (word(words, material.fibres_start), word(words, material.fibres_start + 1) & 0xff);
+    let shifts = |n: u32| {
+        let shifts = word(words, material.fibres_start + 2 + n);
+        AtomShifts { angular: shifts & 31, gain: shifts >> 5 & 31 }
+    };
+    let of_level = |level: u32| {
+        let texels: u32 = [header.width, header.height].iter().map(|&size| level_size(size, level)).product();
+        let of_layer = |layer: u32| {
+            let start = lists_start(words, material, level, layer);
+            let head = word(words, start);
+            let lists = (0..texels).map(|texel| list(words, start, count, texel)).collect();
+            ListsModel { value_bits: head & 0xff, shift: head >> 24, lists }
+        };
+        (0..header.layer_count).map(of_layer).collect()
+    };
+    TensorModel {
+        channels,
+        light_atoms,
+        lights: (0..header.light_count * light_atoms).map(light).collect(),
+        entries,
+        atoms: (0..count).map(shifts).collect(),
+        fibres: (0..header.view_count * count * entries).map(|n| packed_i16(words, material.fibres_start + 2 + count, n) as u16).collect(),
+        lists: (0..header.level_count).map(of_level).collect(),
+    }
+}
+
+/// The ABRDF atoms and values of a texel's list (12.4).
+pub(crate) fn list(words: Words<'_>, start: u32, atom_count: u32, texel: u32) -> Vec<(u32, u16)> {
+    let mut list = open_list(words, start, atom_count, texel);
+    let mut coefficients = Vec::new();
+    while list.index != LIST_END {
+        // The way back from 12.4-5.
+        let value = (list.coefficient + 0x8000) as u32 >> (16 - list.value_bits);
+        coefficients.push((list.index, value as u16));
+        list = next_coefficient(words, list);
+    }
+    coefficients
 }
 
 fn atom(word: u32, quantiser: u32) -> AtomModel {

@@ -344,6 +344,7 @@ impl AuthorsMaterial {
             lights: self.directions.iter().map(|&d| project(d)).collect(),
             views: None,
             channels,
+            tensor: None,
             extras: Vec::new(),
         })
     }

@@ -18,8 +18,9 @@
 //! and checksums are the writer's.
 
 use crate::error::{Result, ToolError};
-use crate::model::{AtomModel, ChannelModel, EnsembleModel, FactorModel, MaterialModel, PairTableModel};
+use crate::model::{AtomModel, ChannelModel, EnsembleModel, FactorModel, MaterialModel, PairTableModel, TensorModel};
 use crate::sector::{Sector, kept_directions};
+use selvedge::tensor::bit_length;
 
 /// What stays of a channel, if it is there.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -77,8 +78,15 @@ pub fn trim(model: &MaterialModel, options: &Trim) -> Result<MaterialModel> {
             ensemble.coefficients.iter_mut().for_each(|level| level.truncate(layers as usize));
         }
     }
+    if let Some(tensor) = &mut left.tensor {
+        let keeps: [bool; 3] = std::array::from_fn(|c| tensor.channels[c] && options.channels[c] == Keep::Texture);
+        keep_channels(tensor, keeps);
+        tensor.lists.truncate(levels as usize);
+        tensor.lists.iter_mut().for_each(|level| level.truncate(layers as usize));
+    }
     keep_directions(&mut left, options);
     if options.unused {
+        left.tensor.iter_mut().filter(|tensor| !tensor.lists.is_empty()).for_each(drop_unused_of_tensor);
         left.channels.iter_mut().filter_map(|channel| channel.ensemble.as_mut()).for_each(drop_unused);
     }
     Ok(left)
@@ -105,6 +113,11 @@ fn keep_directions(model: &mut MaterialModel, options: &Trim) {
         let columns = factor.columns as usize;
         factor.entries = kept.iter().flat_map(|&row| &factor.entries[row as usize * columns..][..columns]).copied().collect();
     };
+    if let Some(tensor) = &mut model.tensor {
+        let (light_row, view_row) = (tensor.light_atoms as usize, tensor.atoms.len() * tensor.entries as usize);
+        tensor.lights = lights.iter().flat_map(|&light| &tensor.lights[light as usize * light_row..][..light_row]).copied().collect();
+        tensor.fibres = views.iter().flat_map(|&view| &tensor.fibres[view as usize * view_row..][..view_row]).copied().collect();
+    }
     for channel in &mut model.channels {
         channel.mean.iter_mut().chain(&mut channel.scale).for_each(table);
         for dictionary in channel.ensemble.iter_mut().flat_map(|ensemble| &mut ensemble.dictionaries) {
@@ -166,6 +179,46 @@ pub fn drop_unused(ensemble: &mut EnsembleModel) {
         drop_columns(&mut dictionary.x, atoms, |atom| &mut atom.x);
         drop_columns(&mut dictionary.y, atoms, |atom| &mut atom.y);
     }
+}
+
+/// Leaves a sparse tensor the textures of some channels; without any it is empty.
+fn keep_channels(tensor: &mut TensorModel, keeps: [bool; 3]) {
+    if !keeps.contains(&true) {
+        *tensor = TensorModel::default();
+    }
+    tensor.channels = keeps;
+    for entry in &mut tensor.lights {
+        entry.iter_mut().zip(keeps).filter(|(_, keeps)| !keeps).for_each(|(channel, _)| *channel = 0);
+    }
+}
+
+/// Leaves out ABRDF atoms that no list has, and light atoms that no entry with a value names.
+///
+/// What stays keeps its order and its values, so that every sum is formed as before.
+fn drop_unused_of_tensor(tensor: &mut TensorModel) {
+    let mut used = vec![false; tensor.atoms.len()];
+    tensor.lists.iter().flatten().flat_map(|layer| &layer.lists).flatten().for_each(|&(atom, _)| used[atom as usize] = true);
+    let atoms = Renumbering::new(&used, true);
+    for (atom, _) in tensor.lists.iter_mut().flatten().flat_map(|layer| &mut layer.lists).flatten() {
+        *atom = atoms.new[*atom as usize];
+    }
+    let (row, entries) = (tensor.atoms.len() * tensor.entries as usize, tensor.entries as usize);
+    let fibres = tensor.fibres.chunks(row);
+    tensor.fibres = fibres.flat_map(|row| atoms.kept.iter().flat_map(|&atom| &row[atom as usize * entries..][..entries])).copied().collect();
+    tensor.atoms = atoms.kept.iter().map(|&atom| tensor.atoms[atom as usize]).collect();
+
+    let mask = (1u16 << bit_length(tensor.light_atoms - 1)).wrapping_sub(1);
+    let mut used = vec![false; tensor.light_atoms as usize];
+    tensor.fibres.iter().filter(|&&entry| entry & !mask != 0).for_each(|&entry| used[(entry & mask) as usize] = true);
+    let light = Renumbering::new(&used, true);
+    // With fewer bits for the number the bits that a value gains are zero, as they were in effect.
+    for entry in &mut tensor.fibres {
+        let value = *entry & !mask;
+        *entry = if value == 0 { 0 } else { value | light.new[(*entry & mask) as usize] as u16 };
+    }
+    let rows = tensor.lights.chunks(tensor.light_atoms as usize);
+    tensor.lights = rows.flat_map(|row| light.kept.iter().map(|&index| row[index as usize])).collect();
+    tensor.light_atoms = light.kept.len() as u32;
 }
 
 fn drop_columns(factor: &mut FactorModel, atoms: &mut [AtomModel], column: fn(&mut AtomModel) -> &mut u32) {

@@ -4,8 +4,8 @@
 //! rule that is broken, where, and what is found there (1.4-4). What is stated comes from the recipe alone, never from a decoder.
 
 use crate::error::{Result, ToolError};
-use crate::example::example_model;
-use crate::extreme::extreme_model;
+use crate::example::{example_model, tensor_example_model};
+use crate::extreme::{extreme_model, extreme_tensor};
 use crate::files;
 use crate::inspect::hex;
 use crate::model::MaterialModel;
@@ -330,7 +330,9 @@ impl Drop for SectionBytes<'_> {
 fn model_of(recipe: &Recipe, models: &BTreeMap<String, MaterialModel>) -> Result<MaterialModel> {
     let wrong = |why: String| ToolError::Usage(format!("{}: {why}", recipe.name));
     let base = match recipe.base.split_once(' ') {
-        None if recipe.base == "example" => example_model(),
+        _ if recipe.base == "example" => example_model(),
+        _ if recipe.base == "tensor example" => tensor_example_model(),
+        Some(("extreme-tensor", seed)) => extreme_tensor(seed.parse().map_err(|_| wrong(format!("`{seed}` is no seed")))?),
         Some(("extreme", seed)) => extreme_model(seed.parse().map_err(|_| wrong(format!("`{seed}` is no seed")))?),
         _ => models.get(&recipe.base).cloned().ok_or_else(|| wrong(format!("no recipe before this one is `{}`", recipe.base)))?,
     };

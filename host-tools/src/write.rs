@@ -1,14 +1,15 @@
 //! The writer: a model becomes the bytes of a file, laid out by chapter 3. One model gives one file.
 
-use crate::model::{CoefficientsModel, EnsembleModel, FactorModel, MaterialModel, MetadataModel, PairTableModel, TransferModel};
+use crate::model::{CoefficientsModel, EnsembleModel, FactorModel, ListsModel, MaterialModel, MetadataModel, PairTableModel, TensorModel, TransferModel};
 use crate::triangulate::{Triangulation, triangulate};
-use selvedge::cost::{Shape, filtered_operations, record_operations};
+use selvedge::cost::{Shape, filtered_operations, layer_operations, record_operations};
 use selvedge::direction::{cross, dot_product};
 use selvedge::direction_set::{cosine_of, reciprocal_of};
-use selvedge::directory::{ANGULAR, ATOMS, COEFFICIENTS, DIRECTIONS, EXTERNAL, MEANS, METADATA, SCALES, SPATIAL};
+use selvedge::directory::{ANGULAR, ATOMS, COEFFICIENTS, DIRECTIONS, EXTERNAL, FIBRES, LIGHT_ATOMS, LISTS, MEANS, METADATA, SCALES, SPATIAL};
 use selvedge::ensemble::{LOW_BITS_BITS, SHIFT_BITS};
 use selvedge::ensemble_set::LOW_BITS_LIMIT;
-use selvedge::header::{CONTENT_DICTIONARY, CONTENT_MATERIAL, HEADER_LENGTH, MAGIC, METHOD_SPARSE_ENSEMBLE};
+use selvedge::header::{CONTENT_DICTIONARY, CONTENT_MATERIAL, HEADER_LENGTH, MAGIC};
+use selvedge::tensor::{GROUP_TEXELS, bit_length, list_low_bits};
 use selvedge::{crc32, sha256};
 
 /// A section before layout.
@@ -91,24 +92,34 @@ fn material_file(model: &MaterialModel, external: Option<(&[u8], bool)>) -> Vec<
     };
     parts.extend(factor_parts(&ensembles, kinds));
     parts.extend(ensembles.iter().map(|&(c, ensemble)| atoms_part(c, ensemble)));
-    let mut records = 0;
+    let tensor = model.tensor.as_ref().filter(|_| model.has_texture());
+    if let (Some(tensor), None) = (tensor, external) {
+        parts.extend(tensor_atoms(tensor));
+    }
+    let mut textures = 0;
     for level in 0..model.level_count {
         let mut at_level = 0;
         for layer in 0..model.layer_count {
             for &(c, ensemble) in &ensembles {
                 let coefficients = &ensemble.coefficients[level as usize][layer as usize];
                 let largest = coefficients.records.iter().map(|record| record.coefficients.len()).max().unwrap_or(0) as u32;
-                at_level += record_operations(largest, model.edge);
+                at_level += 4 * record_operations(largest, model.edge);
                 let bytes = coefficients_bytes(coefficients, ensemble.dictionaries.len() as u32, largest);
                 parts.push(Part { kind: COEFFICIENTS, instance: level << 8 | layer << 4 | c, bytes });
             }
+            if let Some(tensor) = tensor {
+                let lists = &tensor.lists[level as usize][layer as usize];
+                let largest = lists.lists.iter().map(Vec::len).max().unwrap_or(0) as u32;
+                at_level += layer_operations(largest, tensor.atoms.len() as u32, tensor.entries);
+                parts.push(Part { kind: LISTS, instance: level << 8 | layer << 4, bytes: lists_bytes(lists, tensor.atoms.len() as u32, largest) });
+            }
         }
-        records = records.max(at_level);
+        textures = textures.max(at_level);
     }
     parts.extend(extra_parts(model));
 
     let view = view.as_ref().unwrap_or(&light);
-    let states = [0, 1, 2].map(|c| model.channels[c].state());
+    let states = [0, 1, 2].map(|c| model.state(c));
     let shape = Shape {
         candidates: [light.largest_cell(), view.largest_cell()],
         hull_counts: [light.hull.len() as u32, view.hull.len() as u32],
@@ -116,7 +127,7 @@ fn material_file(model: &MaterialModel, external: Option<(&[u8], bool)>) -> Vec<
         scales: model.channels.iter().filter(|channel| channel.scale.is_some()).count() as u32,
     };
     let mut header = header_words(CONTENT_MATERIAL, model, states);
-    header[7] = filtered_operations(shape, records);
+    header[7] = filtered_operations(shape, textures);
     header[8] = model.size[0];
     header[9] = model.size[1];
     header[12] = model.level_count;
@@ -138,8 +149,9 @@ pub fn write_dictionary(model: &MaterialModel) -> Vec<u8> {
     let mut parts = vec![metadata_part(&model.metadata)];
     let ensembles: Vec<(u32, &EnsembleModel)> = (0u32..).zip(&model.channels).filter_map(|(c, channel)| Some((c, channel.ensemble.as_ref()?))).collect();
     parts.extend(factor_parts(&ensembles, &[ANGULAR, SPATIAL]));
+    parts.extend(model.tensor.iter().filter(|_| model.has_texture()).flat_map(tensor_atoms));
     parts.extend(extra_parts(model));
-    let states = [0, 1, 2].map(|c| if model.channels[c].ensemble.is_some() { 2 } else { 0 });
+    let states = [0, 1, 2].map(|c| if model.state(c) == 2 { 2 } else { 0 });
     let mut header = header_words(CONTENT_DICTIONARY, model, states);
     header[8] = 1;
     header[9] = 1;
@@ -153,7 +165,7 @@ fn header_words(content: u32, model: &MaterialModel, states: [u32; 3]) -> [u32; 
     let mut header = [0; 32];
     header[2] = 1;
     header[4] = content;
-    header[5] = METHOD_SPARSE_ENSEMBLE;
+    header[5] = model.method();
     header[10] = model.lights.len() as u32;
     header[11] = model.views().len() as u32;
     header[14] = states[0] | states[1] << 8 | states[2] << 16;
@@ -342,6 +354,51 @@ fn coefficients_bytes(coefficients: &CoefficientsModel, dictionaries: u32, large
         }
     }
     let mut words = vec![coefficients.value_bits | dictionary_bits << 8 | count_bits << 16, coefficients.records.len() as u32, stream.length, largest];
+    words.extend(starts);
+    words.extend(stream.words);
+    words_to_bytes(&words)
+}
+
+/// Light atoms and fibres (12.1, 12.2).
+fn tensor_atoms(tensor: &TensorModel) -> [Part; 2] {
+    let mut words = vec![tensor.light_atoms, 0];
+    let field = |entry: &[i16; 3], c: usize| (entry[c] as u32 & 0x3ff) << (c * 10);
+    words.extend(tensor.lights.iter().map(|entry| field(entry, 0) | field(entry, 1) | field(entry, 2)));
+    let light = Part { kind: LIGHT_ATOMS, instance: 0, bytes: words_to_bytes(&words) };
+    let mut words = vec![tensor.atoms.len() as u32, tensor.entries | bit_length(tensor.light_atoms - 1) << 8];
+    words.extend(tensor.atoms.iter().map(|atom| atom.angular | atom.gain << 5));
+    let entries: Vec<i16> = tensor.fibres.iter().map(|&entry| entry as i16).collect();
+    pack_rows(&mut words, &entries, entries.len() as u32);
+    [light, Part { kind: FIBRES, instance: 0, bytes: words_to_bytes(&words) }]
+}
+
+/// A section of lists (12.3, 12.4).
+fn lists_bytes(model: &ListsModel, atoms: u32, largest: u32) -> Vec<u8> {
+    let (count_bits, index_bits) = (bits_for(largest).max(1), bit_length(atoms - 1));
+    let mut stream = BitWriter::default();
+    let mut starts = Vec::new();
+    for group in model.lists.chunks(GROUP_TEXELS as usize) {
+        starts.push(stream.length);
+        for n in 0..GROUP_TEXELS as usize {
+            stream.push(group.get(n).map_or(0, Vec::len) as u32, count_bits);
+        }
+        for list in group.iter().filter(|list| !list.is_empty()) {
+            let low_bits = list_low_bits(index_bits, list.len() as u32);
+            for &(index, value) in list {
+                stream.push(index, low_bits);
+                stream.push(value as u32, model.value_bits);
+            }
+            let mut high = 0;
+            for &(index, _) in list {
+                stream.push(0, (index >> low_bits) - high);
+                stream.push(1, 1);
+                high = index >> low_bits;
+            }
+            stream.push(0, ((atoms - 1) >> low_bits) - high);
+        }
+    }
+    let head = model.value_bits | count_bits << 8 | index_bits << 16 | model.shift << 24;
+    let mut words = vec![head, model.lists.len() as u32, stream.length, largest];
     words.extend(starts);
     words.extend(stream.words);
     words_to_bytes(&words)

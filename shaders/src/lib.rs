@@ -8,7 +8,7 @@
 //! | binding | type | holds |
 //! |---|---|---|
 //! | 0 | `storage, read` `array<u32>` | the files, and external dictionaries, each from a word of its own on |
-//! | 1 | `storage, read` `array<Material>` | a record of 48 words for each material: `Selvedge::material_at`, then `Material::to_words` |
+//! | 1 | `storage, read` `array<Material>` | a record of 51 words for each material: `Selvedge::material_at`, then `Material::to_words` |
 //! | 2 | `storage, read` `array<Query>` | 10 words for each question (entry points only) |
 //! | 3 | `storage, read_write` `array<Answer>` | 6 words for each answer (entry points only) |
 //!
@@ -27,7 +27,12 @@
 pub enum Method {
     /// Chapter 10.
     SparseEnsemble,
+    /// Chapter 12.
+    SparseTensor,
 }
+
+/// All methods of this version.
+pub const METHODS: [Method; 2] = [Method::SparseEnsemble, Method::SparseTensor];
 
 /// What a shader is wanted for.
 #[derive(Clone, Copy, Debug)]
@@ -60,6 +65,12 @@ pub const SHARED: &[Module] =
 /// The module of the sparse ensemble.
 pub const ENSEMBLE: Module = module!("ensemble");
 
+/// The module of the sparse tensor.
+pub const TENSOR: Module = module!("tensor");
+
+/// What stands in for a method that a shader leaves out.
+pub const LEFT_OUT: [Module; 2] = [module!("no_ensemble"), module!("no_tensor")];
+
 /// The entry points.
 pub const ENTRIES: Module = module!("entries");
 
@@ -72,9 +83,8 @@ pub const ENTRY_POINTS: [&str; 5] = ["texel", "filtered", "trilinear", "floats",
 
 /// The modules of a shader, in order.
 pub fn modules(request: &Request<'_>) -> Vec<Module> {
-    let methods = request.methods.iter().map(|method| match method {
-        Method::SparseEnsemble => ENSEMBLE,
-    });
+    let methods = METHODS.iter().zip([ENSEMBLE, TENSOR]).zip(LEFT_OUT);
+    let methods = methods.map(|((method, there), left_out)| if request.methods.contains(method) { there } else { left_out });
     SHARED.iter().copied().chain(methods).chain(request.entries.then_some(ENTRIES)).collect()
 }
 

@@ -23,12 +23,6 @@ struct Record {
     highs_bit: u32,
 }
 
-// `count` low bits of a window, for count <= 31 (10.4-1).
-fn low_part(window: u32, count: u32) -> u32 {
-    // 10.4-1: a mask by shift; the count never reaches 32.
-    return window & ((1u << count) - 1u);
-}
-
 // First word of the coefficients of a level, layer and channel, by the directory (10.3-1).
 fn coefficients_start(material: Material, channel: Channel, level: u32, layer: u32) -> u32 {
     let layers = level * material.layer_count + layer;

@@ -1,7 +1,8 @@
 // Interpolation in the model (chapter 8) and levels (chapter 9). Twin: decoder-core/src/interpolation.rs.
 //
 // What every method shares: means and scales for pairs of directions, the value of a channel, and the
-// samples that a caller can ask for. The method adds the texture: texture_q20.
+// samples that a caller can ask for. The method adds the texture: texture_q20 of a channel, or
+// textures_q20 of all at once.
 
 // Channel values are limited to this magnitude, Q20: 128 (8.1-4).
 const VALUE_BOUND: i32 = 0x08000000;
@@ -49,8 +50,8 @@ fn scale_texture(texture: i32, scale: i32, shift: u32) -> i32 {
     return clamp_magnitude(multiply_q15(texture, scale), VALUE_BOUND >> shift) << shift;
 }
 
-// The value of a channel at one level, Q20 (8.3).
-fn channel_q20(material: Material, channel: Channel, level: u32, x: Axis, y: Axis, light: Taps, view: Taps) -> i32 {
+// The value of a channel at one level, Q20 (8.3); `given` is its texture where the method gives those of all channels at once.
+fn channel_q20(material: Material, channel: Channel, given: i32, level: u32, x: Axis, y: Axis, light: Taps, view: Taps) -> i32 {
     // 8.3-1: a missing channel is zero.
     if (channel.state == CHANNEL_MISSING) {
         return 0;
@@ -60,7 +61,11 @@ fn channel_q20(material: Material, channel: Channel, level: u32, x: Axis, y: Axi
     if (channel.state != CHANNEL_FULL) {
         return clamp_magnitude(mean, VALUE_BOUND);
     }
-    var texture = texture_q20(material, channel, level, x, y, light, view);
+    var texture = given;
+    // 8.3-3: a sparse ensemble gives each channel's texture by itself.
+    if (material.method != METHOD_SPARSE_TENSOR) {
+        texture = texture_q20(material, channel, level, x, y, light, view);
+    }
     // 8.2-3: a channel without scales keeps its texture.
     if (channel.scale_start != 0u) {
         let scale = scale_q15(material, channel, light, view);
@@ -85,9 +90,20 @@ fn channel_of(material: Material, number: u32) -> Channel {
 // The values of all channels at one level (8.3).
 fn level_values(material: Material, level: u32, x: Axis, y: Axis, light: Taps, view: Taps) -> Values {
     var values = Values(0, 0, 0);
+    // 8.3-3: a sparse tensor gives the textures of all channels at once.
+    if (material.method == METHOD_SPARSE_TENSOR && material.full_count != 0u) {
+        values = textures_q20(material, level, x, y, light, view);
+    }
     // 8.3-4: a loop, so that a compiler for GPUs makes one copy of a channel.
     for (var number = 0u; number < 3u; number++) {
-        let value = channel_q20(material, channel_of(material, number), level, x, y, light, view);
+        var given = values.c0;
+        if (number == 1u) {
+            given = values.c1;
+        }
+        if (number == 2u) {
+            given = values.c2;
+        }
+        let value = channel_q20(material, channel_of(material, number), given, level, x, y, light, view);
         if (number == 0u) {
             values.c0 = value;
         }

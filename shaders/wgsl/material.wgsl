@@ -8,6 +8,10 @@ const CHANNEL_MISSING: u32 = 0u;
 const CHANNEL_MEAN: u32 = 1u;
 // A channel with texture.
 const CHANNEL_FULL: u32 = 2u;
+// The sparse ensemble, chapter 10.
+const METHOD_SPARSE_ENSEMBLE: u32 = 1u;
+// The sparse tensor, chapter 12.
+const METHOD_SPARSE_TENSOR: u32 = 2u;
 // Channels are base-two logarithms of radiance plus an offset.
 const TRANSFER_LOG2: u32 = 0u;
 // Channels are linear.
@@ -45,6 +49,9 @@ struct Material {
     layer_limit: u32,
     full_count: u32,
     coefficient_entry: u32,
+    method: u32,
+    light_atoms_start: u32,
+    fibres_start: u32,
     channels: array<Channel, 3>,
 }
 

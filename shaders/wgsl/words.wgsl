@@ -35,3 +35,9 @@ fn bit_window(start: u32, bit: u32) -> u32 {
     // 1.2-3: the second word is shifted in two steps, since a shift by 32 has no common meaning.
     return (word(index) >> shift) | ((word(index + 1u) << 1u) << (31u - shift));
 }
+
+// `count` low bits of a window, for count <= 31 (10.4-1).
+fn low_part(window: u32, count: u32) -> u32 {
+    // 10.4-1: a mask by shift; the count never reaches 32.
+    return window & ((1u << count) - 1u);
+}

@@ -19,6 +19,8 @@ Commands
       reads queries from standard input, prints one line of results for each.
   example TEXT OUT
       collects the bytes of the worked example from the text and writes them.
+  tensor-example TEXT FILE
+      compares the bytes of the tensor example that chapter 12 shows with those of FILE.
   selftest
       computes the numeric examples of the text that need no file.
 
@@ -62,6 +64,7 @@ ONE_Q30 = 0x40000000
 BINARY32_MAX = 0x7F7FFFFF
 VALUE_BOUND = 0x08000000
 RECORD_BOUND = 0x02000000
+LAYER_BOUND = 0x08000000
 
 # How often a value left its word where the text proves that it does not.
 wraps = [0]
@@ -225,6 +228,7 @@ def assemble_binary32(mantissa, exponent):
 MAGIC = bytes.fromhex("53454c560d0a1a0a")
 MATERIAL, DICTIONARY = 0, 1
 MISSING, MEAN, FULL = 0, 1, 2
+ENSEMBLE, TENSOR = 1, 2
 
 METADATA = 0x0001
 REFERENCE = 0x0002
@@ -235,8 +239,12 @@ ANGULAR = 0x0110
 SPATIAL = 0x0111
 ATOMS = 0x0112
 COEFFICIENTS = 0x0113
+LIGHT_ATOMS = 0x0210
+FIBRES = 0x0211
+LISTS = 0x0212
 OPTIONAL = 0x8000
 KNOWN_KINDS = (METADATA, REFERENCE, DIRECTIONS, MEANS, SCALES, ANGULAR, SPATIAL, ATOMS, COEFFICIENTS)
+KNOWN_KINDS += (LIGHT_ATOMS, FIBRES, LISTS)
 
 
 class Section:
@@ -339,7 +347,7 @@ def check_header(file, content=None):
     file.read_header()
     if file.content not in (MATERIAL, DICTIONARY) or content not in (None, file.content):
         file.fail("3.1-7", 16, file.content)
-    if file.method != 1:
+    if file.method not in (ENSEMBLE, TENSOR):
         file.fail("3.1-8", 20, file.method)
     for at in (32, 36):
         if not 1 <= file.u32(at) <= 16384:
@@ -352,7 +360,7 @@ def check_header(file, content=None):
         file.fail("3.1-11", 48, levels)
     if levels > 1 and max(level_size(file.width, levels - 2), level_size(file.height, levels - 2)) <= 1:
         file.fail("3.1-11", 48, levels)
-    if not 1 <= file.edge <= 16:
+    if not 1 <= file.edge <= (16 if file.method == ENSEMBLE else 1):
         file.fail("3.1-12", 52, file.edge)
     if not 1 <= file.layer_count <= 8:
         file.fail("3.1-13", 53, file.layer_count)
@@ -450,9 +458,14 @@ def called_for(file):
     """3.3: the required sections in the order of step 8, then the allowed ones."""
     required, allowed = [(METADATA, 0)], []
     channels = range(3)
+    # A kind of the other method is foreign, and one of the method 2 without a channel of state 2.
+    ensemble = file.full if file.method == ENSEMBLE else []
+    tensor = file.method == TENSOR and bool(file.full)
     if file.content == DICTIONARY:
-        required += [(ANGULAR, channel) for channel in file.full]
-        allowed += [(SPATIAL, channel) for channel in file.full]
+        required += [(ANGULAR, channel) for channel in ensemble]
+        allowed += [(SPATIAL, channel) for channel in ensemble]
+        if tensor:
+            required += [(LIGHT_ATOMS, 0), (FIBRES, 0)]
         return required, allowed
     referring = file.section(REFERENCE) is not None
     allowed.append((REFERENCE, 0))
@@ -461,13 +474,17 @@ def called_for(file):
     required += [(MEANS, channel) for channel in channels if file.state[channel] != MISSING]
     allowed += [(SCALES, channel) for channel in file.full]
     if not referring:
-        required += [(ANGULAR, channel) for channel in file.full]
-    (allowed if referring else required).extend((SPATIAL, channel) for channel in file.full)
-    required += [(ATOMS, channel) for channel in file.full]
+        required += [(ANGULAR, channel) for channel in ensemble]
+    (allowed if referring else required).extend((SPATIAL, channel) for channel in ensemble)
+    required += [(ATOMS, channel) for channel in ensemble]
+    if tensor and not referring:
+        required += [(LIGHT_ATOMS, 0), (FIBRES, 0)]
     for level in range(file.level_count):
         for layer in range(file.layer_count):
-            for channel in file.full:
+            for channel in ensemble:
                 required.append((COEFFICIENTS, level * 256 + layer * 16 + channel))
+            if tensor:
+                required.append((LISTS, level * 256 + layer * 16))
     return required, allowed
 
 
@@ -551,7 +568,7 @@ def check_reference(file, dictionary, limits):
         and other.view_count == file.view_count
         and all(other.state[channel] == FULL for channel in file.full)
     )
-    for channel in file.full:
+    for channel in file.full if file.method == ENSEMBLE else []:
         if file.section(SPATIAL, channel) is None:
             same = same and other.section(SPATIAL, channel) is not None and other.edge == file.edge
     if not same:
@@ -572,6 +589,10 @@ def check_dictionary_rest(file):
     check_directory(file)
     check_sections(file)
     check_metadata(file)
+    if file.method == TENSOR:
+        if file.full:
+            check_tensor_tables(file)
+        return
     for channel in file.full:
         check_factors(file, ANGULAR, channel)
         if file.section(SPATIAL, channel) is not None:
@@ -582,12 +603,17 @@ def check_dictionary_rest(file):
 # ---------------------------------------------------------------- chapter 4
 
 
-def stated_cost(file, largest_counts):
-    """4.2-1, 4.2-2, 4.2-3. `largest_counts[(level, layer, channel)]` is `n`."""
+def stated_cost(file, textures):
+    """4.2-1. `textures` is that of the method."""
     locate_light = operations_to_locate(file.light_set)
     locate_view = operations_to_locate(file.view_set)
     means = sum(1 for channel in range(3) if file.state[channel] != MISSING)
     scales = sum(1 for channel in range(3) if file.section(SCALES, channel) is not None)
+    return min(18 + locate_light + locate_view + 15 * means + 17 * scales + textures + 102, MASK)
+
+
+def textures_of_ensemble(file, largest_counts):
+    """4.2-1, 4.2-2. `largest_counts[(level, layer, channel)]` is `n`."""
     edge = file.edge
     records = 0
     for level in range(file.level_count):
@@ -597,7 +623,19 @@ def stated_cost(file, largest_counts):
                 n = largest_counts[level, layer, channel]
                 level_sum += 9 * n + 4 * min(n, edge * edge) + 4 * min(n, edge) + 8
         records = max(records, level_sum)
-    return min(18 + locate_light + locate_view + 15 * means + 17 * scales + 4 * records + 102, MASK)
+    return 4 * records
+
+
+def textures_of_tensor(file, tensor, largest_counts):
+    """4.2-1, 4.2-4. `largest_counts[(level, layer)]` is `n`."""
+    textures = 0
+    for level in range(file.level_count):
+        level_sum = 0
+        for layer in range(file.layer_count):
+            n = largest_counts[level, layer]
+            level_sum += 12 * n + min(4 * n, tensor.atom_count) * (39 * tensor.entries + 6)
+        textures = max(textures, level_sum)
+    return textures
 
 
 def operations_to_locate(directions):
@@ -1536,8 +1574,325 @@ def check_ensemble(file, dictionary):
                 file.coefficients[level, layer, channel] = coefficients
                 largest[level, layer, channel] = coefficients.largest
     # 13.4
-    if file.operations != stated_cost(file, largest):
+    if file.operations != stated_cost(file, textures_of_ensemble(file, largest)):
         file.fail("4.2-1", 28, file.operations)
+
+
+# --------------------------------------------------------------- chapter 12
+
+
+def bits_that_hold(value):
+    """12.2-2, 12.3, 12.4-2: the bits from the lowest up to the highest one, 0 for 0."""
+    return value.bit_length()
+
+
+def light_atom_entry(word):
+    """12.1-4: an entry's three channels, each two's complement of ten bits."""
+    channels = []
+    for channel in range(3):
+        bits = (word >> (10 * channel)) & 0x3FF
+        channels.append(bits - 1024 if bits >= 512 else bits)
+    return tuple(channels)
+
+
+def fibre_entry(half, light_index_bits):
+    """12.2, 12.2-6: which light atom an entry names, and its value in Q15."""
+    index = half & ((1 << light_index_bits) - 1)
+    return index, as_i16(half - index)
+
+
+class Tensor:
+    """12.1, 12.2: the light atoms and the fibres of a file."""
+
+    def __init__(self):
+        self.light_atoms = []  # by light, then by index: three channels
+        self.shifts = []  # by ABRDF atom: angular_shift, gain_shift
+        self.fibres = []  # by view, then by ABRDF atom: a list of (index, value)
+
+    def blended_light_atom(self, index, light):
+        """12.5-1, of the three channels."""
+        result = []
+        for channel in range(3):
+            total = 0
+            for row, weight in zip(light.rows, light.weights):
+                total = i32(total + i32(self.light_atoms[row][index][channel] * weight))
+            result.append(i32(total + (1 << 8)) >> 9)
+        return result
+
+
+def check_tensor_tables(file):
+    """1.4, step 13.1 of the method 2: 12.1-1 to 12.1-3, 12.2-1 to 12.2-5."""
+    file.tensor = Tensor()
+    check_light_atoms(file, file.tensor)
+    check_fibres(file, file.tensor)
+
+
+def check_light_atoms(file, tensor):
+    """12.1-1, 12.1-2, 12.1-3."""
+    section = file.section(LIGHT_ATOMS)
+    at = section.offset
+    if section.length < 8:
+        file.fail("12.1-1", at, section.length)
+    count = file.u32(at)
+    if not 1 <= count <= 256:
+        file.fail("12.1-2", at, count)
+    if file.u32(at + 4) != 0:
+        file.fail("12.1-2", at + 4, file.u32(at + 4))
+    if section.length != 8 + 4 * file.light_count * count:
+        file.fail("12.1-1", at, section.length)
+    used = 0  # the bits that may be set
+    for channel in file.full:
+        used |= 0x3FF << (10 * channel)
+    for light in range(file.light_count):
+        row = []
+        for index in range(count):
+            place = at + 8 + 4 * (light * count + index)
+            word = file.u32(place)
+            if word & ~used != 0:
+                file.fail("12.1-3", place, word)
+            row.append(light_atom_entry(word))
+        tensor.light_atoms.append(row)
+    tensor.light_atom_count = count
+
+
+def check_fibres(file, tensor):
+    """12.2-1 to 12.2-5."""
+    section = file.section(FIBRES)
+    at = section.offset
+    if section.length < 8:
+        file.fail("12.2-1", at, section.length)
+    atoms = file.u32(at)
+    if not 1 <= atoms <= 1024:
+        file.fail("12.2-2", at, atoms)
+    entries, light_index_bits = file.u8(at + 4), file.u8(at + 5)
+    good = 1 <= entries <= 32 and light_index_bits == bits_that_hold(tensor.light_atom_count - 1)
+    if not good or file.u16(at + 6) != 0:
+        file.fail("12.2-2", at + 4, file.u32(at + 4))
+    halves = file.view_count * atoms * entries
+    if section.length != 8 + 4 * atoms + 4 * ceil_div(halves, 2):
+        file.fail("12.2-1", at, section.length)
+    for atom in range(atoms):
+        place = at + 8 + 4 * atom
+        word = file.u32(place)
+        if word >> 10 != 0:
+            file.fail("12.2-3", place, word)
+        tensor.shifts.append((word & 31, (word >> 5) & 31))
+    first = at + 8 + 4 * atoms
+    for view in range(file.view_count):
+        row = []
+        for atom in range(atoms):
+            begin = first + 2 * (view * atoms + atom) * entries
+            fibre = []
+            for n in range(entries):
+                half = file.u16(begin + 2 * n)
+                index, value = fibre_entry(half, light_index_bits)
+                if index >= tensor.light_atom_count:
+                    file.fail("12.2-4", begin + 2 * n, half)
+                fibre.append((index, value))
+            magnitude = sum(abs(value) for _, value in fibre)
+            if magnitude > 1 << 18:
+                file.fail("12.2-5", begin, magnitude)
+            row.append(fibre)
+        tensor.fibres.append(row)
+    if halves % 2 != 0 and file.u16(first + 2 * halves) != 0:
+        file.fail("12.2-4", first + 2 * halves, file.u16(first + 2 * halves))
+    tensor.atom_count, tensor.entries = atoms, entries
+
+
+def list_low_bits(count, index_bits):
+    """12.4-2."""
+    return index_bits - min(index_bits, bits_that_hold(count))
+
+
+def list_coefficient(value, value_bits):
+    """12.4-5."""
+    return ((2 * value + 1) << (15 - value_bits)) - (1 << 15)
+
+
+class Lists:
+    """12.3: the section of one level and layer."""
+
+    def __init__(self, file, section, tensor):
+        self.file, self.section, self.tensor = file, section, tensor
+        at = section.offset
+        self.value_bits = file.u8(at)
+        self.count_bits = file.u8(at + 1)
+        self.index_bits = file.u8(at + 2)
+        self.shift = file.u8(at + 3)
+        self.texels = file.u32(at + 4)
+        self.bits = file.u32(at + 8)
+        self.largest = file.u32(at + 12)
+        self.groups = ceil_div(self.texels, 8)
+        self.stream = at // 4 + 4 + self.groups  # word
+        self.end = (at + section.length) // 4
+        self.lists = []  # by texel: a list of (index, coefficient)
+
+    def field(self, bit, n):
+        """10.4-1, 1.2-5."""
+        return self.file.bit_window(self.stream, bit, self.end) & ((1 << n) - 1)
+
+    def place(self, bit):
+        """1.4-4: the word of the stream that holds a bit."""
+        return 4 * (self.stream + (bit >> 5))
+
+    def check(self, level):
+        """1.4, step 13.2 of the method 2, from 12.3-3 on."""
+        file, section = self.file, self.section
+        at = section.offset
+        if (
+            not 1 <= self.value_bits <= 15
+            or not 1 <= self.count_bits <= 6
+            or self.index_bits != bits_that_hold(self.tensor.atom_count - 1)
+            or self.shift > 31
+        ):
+            file.fail("12.3-3", at, file.u32(at))
+        if self.texels != level_size(file.width, level) * level_size(file.height, level):
+            file.fail("12.3-3", at + 4, self.texels)
+        if section.length != 16 + 4 * self.groups + 4 * ceil_div(self.bits, 32):
+            file.fail("12.3-2", at, section.length)
+        next_bit = 0
+        for group in range(self.groups):
+            next_bit = self.check_group(group, next_bit)
+        if next_bit != self.bits:
+            file.fail("12.4-6", at + 8, self.bits)
+        if self.bits % 32 != 0:
+            unused = file.word(self.end - 1) >> (self.bits % 32)
+            if unused != 0:
+                file.fail("12.4-9", 4 * (self.end - 1), unused)
+        if self.largest != max(len(pairs) for pairs in self.lists):
+            file.fail("12.3-4", at + 12, self.largest)
+
+    def check_group(self, group, next_bit):
+        """12.4-1, 12.4-3; one group of step 13.2: 12.4-6, 12.4-7 and its lists."""
+        file = self.file
+        where = self.section.offset + 16 + 4 * group
+        first = file.u32(where)
+        if first != next_bit:
+            file.fail("12.4-6", where, first)
+        bit = first + 8 * self.count_bits
+        if bit > self.bits:
+            file.fail("12.4-6", self.place(first), first)
+        for n in range(8):
+            count = self.field(first + n * self.count_bits, self.count_bits)
+            if 8 * group + n >= self.texels:
+                if count != 0:
+                    file.fail("12.4-7", self.place(first), count)
+                continue
+            bit = self.check_list(bit, count)
+        return bit
+
+    def check_list(self, first, count):
+        """12.4-2, 12.4-4, 12.4-5; one list of step 13.2: 12.4-6, 12.4-8, 12.5-8."""
+        file, tensor = self.file, self.tensor
+        if count == 0:
+            self.lists.append([])
+            return first
+        low_bits = list_low_bits(count, self.index_bits)
+        high_bit = first + count * (low_bits + self.value_bits)
+        after = high_bit + count + ((tensor.atom_count - 1) >> low_bits)
+        if after > self.bits:
+            file.fail("12.4-6", self.place(first), first)
+        highs = []
+        zeros = 0
+        for bit in range(high_bit, after):
+            if self.field(bit, 1) == 1:
+                highs.append(zeros)
+            else:
+                zeros += 1
+        if len(highs) != count:
+            file.fail("12.4-8", self.place(first), first)
+        pairs = []
+        before = -1
+        for n in range(count):
+            at = first + n * (low_bits + self.value_bits)
+            index = (highs[n] << low_bits) | self.field(at, low_bits)
+            if not before < index < tensor.atom_count:
+                file.fail("12.4-8", self.place(first), first)
+            before = index
+            value = self.field(at + low_bits, self.value_bits)
+            pairs.append((index, list_coefficient(value, self.value_bits)))
+        magnitude = sum(ceil_div(abs(c), 1 << tensor.shifts[index][1]) for index, c in pairs)
+        if magnitude > 65534:
+            file.fail("12.5-8", self.place(first), magnitude)
+        self.lists.append(pairs)
+        return after
+
+
+def check_tensor(file, dictionary):
+    """1.4, step 13 with the method 2."""
+    textures = 0
+    if file.full:
+        # 13.1; 3.5-7
+        if dictionary is None:
+            check_tensor_tables(file)
+        else:
+            file.tensor = dictionary.tensor
+        # 13.2; 12.3-1
+        file.lists = {}
+        largest = {}
+        for level in range(file.level_count):
+            for layer in range(file.layer_count):
+                section = file.section(LISTS, level * 256 + layer * 16)
+                if section.length < 16:
+                    file.fail("12.3-2", section.offset, section.length)
+                lists = Lists(file, section, file.tensor)
+                lists.check(level)
+                file.lists[level, layer] = lists
+                largest[level, layer] = lists.largest
+        textures = textures_of_tensor(file, file.tensor, largest)
+    # 13.3
+    if file.operations != stated_cost(file, textures):
+        file.fail("4.2-1", 28, file.operations)
+
+
+class AngularAtoms:
+    """12.5-1 to 12.5-3 for the taps of one sample; what was computed is kept."""
+
+    def __init__(self, tensor, light, view):
+        self.tensor, self.light, self.view = tensor, light, view
+        self.light_atoms, self.atoms = {}, {}
+
+    def light_atom(self, index):
+        """12.5-1."""
+        if index not in self.light_atoms:
+            self.light_atoms[index] = self.tensor.blended_light_atom(index, self.light)
+        return self.light_atoms[index]
+
+    def angular(self, atom):
+        """12.5-2, 12.5-3."""
+        if atom not in self.atoms:
+            sums = [0, 0, 0]
+            for row, weight in zip(self.view.rows, self.view.weights):
+                for index, value in self.tensor.fibres[row][atom]:
+                    h = i32(i32(value * weight) + (1 << 17)) >> 18
+                    if h == 0:
+                        continue
+                    u = self.light_atom(index)
+                    for channel in range(3):
+                        sums[channel] = i32(sums[channel] + i32(h * u[channel]))
+            angular_shift = self.tensor.shifts[atom][0]
+            self.atoms[atom] = [clamp_magnitude(round_shift(total, angular_shift), 32767) for total in sums]
+        return self.atoms[atom]
+
+
+def layer_textures(tensor, lists, width, angular_atoms, axis_x, axis_y):
+    """12.5-4, 12.5-5, 12.5-6: the textures of the three channels of one layer."""
+    weights = {}  # by ABRDF atom
+    for span_y in axis_y:
+        for span_x in axis_x:
+            # 12.5-4; where both texels of an axis are one, its span has both weights
+            weight_x, weight_y = sum(span_x.weights), sum(span_y.weights)
+            for atom, coefficient in lists.lists[span_y.block * width + span_x.block]:
+                weight = multiply_q15(i32(coefficient * weight_x), weight_y)
+                weights[atom] = i32(weights.get(atom, 0) + weight)
+    totals = [0, 0, 0]
+    for atom, weight in weights.items():
+        gain_shift = tensor.shifts[atom][1]
+        angular = angular_atoms.angular(atom)
+        for channel in range(3):
+            summand = round_shift(multiply_q15(weight, angular[channel]), gain_shift)
+            totals[channel] = i32(totals[channel] + summand)
+    return [clamp_magnitude(round_shift(total, lists.shift), LAYER_BOUND) for total in totals]
 
 
 # ------------------------------------------------- opening (order of 1.4)
@@ -1568,7 +1923,10 @@ def open_file(data, dictionary=None, limits=None, as_material=False):
     for channel in file.full:
         if file.section(SCALES, channel) is not None:
             check_pairs(file, SCALES, channel)
-    check_ensemble(file, other)  # step 13
+    if file.method == TENSOR:  # step 13
+        check_tensor(file, other)
+    else:
+        check_ensemble(file, other)
     return file
 
 
@@ -1636,9 +1994,32 @@ class Material:
                     texture = i32(texture + self.record_texture(channel, record, light, view, span_x, span_y))
         return texture
 
+    # chapter 12
+
+    def tensor_textures(self, level, light, view, axis_x, axis_y):
+        """12.5-7: the textures of the three channels."""
+        file = self.file
+        width = level_size(file.width, level)
+        angular_atoms = AngularAtoms(file.tensor, light, view)
+        textures = [0, 0, 0]
+        for layer in range(self.layer_limit):
+            lists = file.lists[level, layer]
+            of_layer = layer_textures(file.tensor, lists, width, angular_atoms, axis_x, axis_y)
+            textures = [i32(texture + more) for texture, more in zip(textures, of_layer)]
+        return textures
+
     # chapter 8
 
-    def value(self, channel, level, light, view, axis_x, axis_y):
+    def textures(self, level, light, view, axis_x, axis_y):
+        """The textures of the full channels by 10.7-6 or 12.5-7."""
+        if self.file.method == TENSOR and self.file.full:
+            return self.tensor_textures(level, light, view, axis_x, axis_y)
+        return [
+            self.texture(channel, level, light, view, axis_x, axis_y) if channel in self.file.full else None
+            for channel in range(3)
+        ]
+
+    def value(self, channel, texture, light, view):
         """8.3-1, 8.3-2, 8.3-3."""
         state = self.file.state[channel]
         if state == MISSING:
@@ -1646,14 +2027,14 @@ class Material:
         mean_q20 = self.means[channel].mean_q20(light, view)
         if state == MEAN:
             return clamp_magnitude(mean_q20, VALUE_BOUND)
-        texture = self.texture(channel, level, light, view, axis_x, axis_y)
         if channel in self.scales:
             texture = self.scales[channel].scale_texture(texture, light, view)
         return clamp_magnitude(i32(texture + mean_q20), VALUE_BOUND)
 
     def values(self, level, light, view, axis_x, axis_y):
         """8.3-4."""
-        return [self.value(channel, level, light, view, axis_x, axis_y) for channel in range(3)]
+        textures = self.textures(level, light, view, axis_x, axis_y)
+        return [self.value(channel, textures[channel], light, view) for channel in range(3)]
 
     def axes(self, level, u_q32, v_q32):
         """8.4-1."""
@@ -1900,14 +2281,14 @@ def command_vectors(folder):
     return 1 if counts["valid"][1] or counts["invalid"][1] else 0
 
 
-def command_example(text_path, out_path):
-    """Collects the hex dumps of the text, which overlap and must agree."""
+def bytes_of_fences(text_path, fence):
+    """The hex dumps of the text behind a fence by their offsets, or None if two do not agree."""
     found = {}
     inside = False
     with open(text_path, encoding="utf-8") as text:
         for line in text:
             if line.startswith("```"):
-                inside = line.strip() == "```hex"
+                inside = line.strip() == fence
                 continue
             if not inside:
                 continue
@@ -1916,7 +2297,15 @@ def command_example(text_path, out_path):
                 at = int(offset, 16) + n
                 if found.setdefault(at, int(number, 16)) != int(number, 16):
                     print("two values for byte %#x" % at)
-                    return 1
+                    return None
+    return found
+
+
+def command_example(text_path, out_path):
+    """Collects the hex dumps of the text, which overlap and must agree."""
+    found = bytes_of_fences(text_path, "```hex")
+    if found is None:
+        return 1
     length = struct.unpack("<I", bytes(found[at] for at in range(12, 16)))[0]
     missing = [at for at in range(length) if at not in found]
     print("%d bytes from the text, %d not shown: %s" % (len(found), len(missing), [hex(at) for at in missing]))
@@ -1925,8 +2314,39 @@ def command_example(text_path, out_path):
     return 0
 
 
+def command_tensor_example(text_path, path):
+    """Chapter 12 shows three sections of the tensor example; the rest is only in the file."""
+    found = bytes_of_fences(text_path, "```hex tensor")
+    if found is None:
+        return 1
+    data = read_bytes(path)
+    wrong = [at for at in sorted(found) if at >= len(data) or data[at] != found[at]]
+    file = open_file(data)
+    sections = [file.section(kind) for kind in (LIGHT_ATOMS, FIBRES, LISTS)]
+    shown = {at for section in sections for at in range(section.offset, section.offset + section.length)}
+    print(
+        "%d bytes from the text, %d differ: %s; of the three sections %d are not shown"
+        % (len(found), len(wrong), [hex(at) for at in wrong], len(shown - set(found)))
+    )
+    return 1 if wrong or shown - set(found) else 0
+
+
+def tensor_of_example():
+    """The tensor of chapter 12 as far as its example of 12.5 needs it: light 1, view 2."""
+    tensor = Tensor()
+    tensor.light_atoms = {1: [(400, 80, 0), (511, -250, 0), (60, 300, 0)]}
+    tensor.shifts = [(13, 1), (12, 2)]
+    tensor.fibres = {2: [[(0, 24000), (2, -4000)], [(1, 20000), (2, 3000)]]}
+    return tensor
+
+
 def command_selftest():
-    """The numeric examples of chapters 1 to 9 that need no file."""
+    """The numeric examples of chapters 1 to 9 and 12 that need no file."""
+    tensor = tensor_of_example()
+    angular_atoms = AngularAtoms(tensor, taps_of_sample(1), taps_of_sample(2))
+    lists = Lists.__new__(Lists)  # texel (0, 0) of 12.4, without its file
+    lists.lists, lists.shift = [[(0, 32256), (1, -22016)]], 11
+    one_texel = axis_of_texel(0, 1)
     example_matrix = (8192, 0, 9338, 8192, -3233, -4756, 8192, 16647, 0)
     example_values = (as_i32(0xFFEEBE0A), as_i32(0xFFFFFE70), 0)
     pairs = [
@@ -1965,6 +2385,14 @@ def command_selftest():
         ("7.4", log2_transfer(as_i32(0xFFD80000), 0x3A800000, 0x4000), 0x3DB404F3),
         ("9.1", [(level_size(3, n), level_size(2, n)) for n in range(3)], [(3, 2), (2, 1), (1, 1)]),
         ("9.2", 0x100 + multiply_q15(0x200, 0x4000), 0x200),
+        ("12.1", [light_atom_entry(x) for x in (0x000191FF, 0x000CE12C, 0x0007FC00)],
+         [(511, 100, 0), (300, -200, 0), (0, 511, 0)]),
+        ("12.2", [fibre_entry(x, 2) for x in (0x7FFC, 0xE0C2, 0x5DC0, 0xF062, 0x4E21, 0x0BBA)],
+         [(0, 32764), (2, -8000), (0, 24000), (2, -4000), (1, 20000), (2, 3000)]),
+        ("12.4", (list_low_bits(2, 1), list_coefficient(63, 6), list_coefficient(10, 6)), (0, 32256, -22016)),
+        ("12.5-1", [tensor.blended_light_atom(n, taps_of_sample(1))[0] for n in (0, 2)], [400 * 64, 60 * 64]),
+        ("12.5-3", [angular_atoms.angular(n)[0:2] for n in (0, 1)], [[0x23B5, 0x02BF], [0x4F59, -0x1F48]]),
+        ("12.5-6", layer_textures(tensor, lists, 3, angular_atoms, one_texel, one_texel)[0:2], [0x43F2, 0x69B2]),
     ]
     bad = 0
     for name, got, wanted in pairs:
@@ -2007,6 +2435,8 @@ def main(arguments):
             return command_samples(plain[1], options)
         if plain[0:1] == ["example"] and len(plain) == 3:
             return command_example(plain[1], plain[2])
+        if plain[0:1] == ["tensor-example"] and len(plain) == 3:
+            return command_tensor_example(plain[1], plain[2])
         if plain == ["serve"]:
             return command_serve()
         if plain == ["selftest"]:

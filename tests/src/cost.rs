@@ -4,12 +4,13 @@
 //! from the decoder is found out. Prices are those of the steps that are taken, where the file states those of the worst sample.
 
 use selvedge::direction::{clamp_direction, coarse_q14, cross, grid_cell, grid_start, point, triangles_start};
-use selvedge::ensemble::{RECORD_BOUND, Record, blend_column, blend_span, coefficients_start, dequantise, low_part, read_record};
+use selvedge::ensemble::{RECORD_BOUND, Record, blend_column, blend_span, coefficients_start, dequantise, read_record};
 use selvedge::fixed::{clamp_magnitude, multiply_q15, round_shift};
 use selvedge::interpolation::{VALUE_BOUND, mean_q20, scale_q15, scale_texture};
-use selvedge::material::{CHANNEL_FULL, CHANNEL_MISSING, Channel, level_size};
+use selvedge::material::{CHANNEL_FULL, CHANNEL_MISSING, Channel, METHOD_SPARSE_TENSOR, level_size};
 use selvedge::position::{Span, axis_at_position, block_count};
-use selvedge::words::{bit_window, high_i16, low_i16, word};
+use selvedge::tensor::{LIST_END, lists_start, next_coefficient, open_list};
+use selvedge::words::{bit_window, high_i16, low_i16, low_part, packed_i16, word};
 use selvedge::{Direction, Selvedge, Taps};
 
 /// A walk's count and what it came to.
@@ -28,8 +29,17 @@ pub fn filtered(material: &Selvedge<'_>, level: u32, u_q32: u32, v_q32: u32, lig
     let (light, view) = (material.locate_light(light), material.locate_view(view));
     let axis = |size: u32, at: u32| axis_at_position(m.edge, m.edge_reciprocal_q18, level_size(size, level), at);
     let (x, y) = (axis(m.width, u_q32), axis(m.height, v_q32));
+    let mut given = [0i32; 3];
+    if m.method == METHOD_SPARSE_TENSOR && m.full_count > 0 {
+        for layer in 0..m.layer_limit {
+            let part = walk_layer(material, level, layer, [x, y], light, view, &mut operations);
+            given.iter_mut().zip(part).for_each(|(given, part)| *given = given.wrapping_add(part));
+        }
+    }
+    let mut given = given.into_iter();
     let spans = |axis: selvedge::position::Axis| if axis.count == 2 { vec![axis.first, axis.second] } else { vec![axis.first] };
     let values = m.channels.map(|channel| {
+        let mut texture = given.next().unwrap_or(0);
         if channel.state == CHANNEL_MISSING {
             return 0;
         }
@@ -39,8 +49,8 @@ pub fn filtered(material: &Selvedge<'_>, level: u32, u_q32: u32, v_q32: u32, lig
         if channel.state != CHANNEL_FULL {
             return clamp_magnitude(mean, VALUE_BOUND);
         }
-        let mut texture = 0i32;
-        for span_y in spans(y) {
+        let blocks = if m.method == METHOD_SPARSE_TENSOR { Vec::new() } else { spans(y) };
+        for span_y in blocks {
             for span_x in spans(x) {
                 let block = span_y.block * block_count(m, level_size(m.width, level)) + span_x.block;
                 for layer in 0..m.layer_limit {
@@ -60,6 +70,57 @@ pub fn filtered(material: &Selvedge<'_>, level: u32, u_q32: u32, v_q32: u32, lig
     // Matrix, transfer and presentation.
     operations += 102;
     Counted { operations, values }
+}
+
+/// A layer of a sparse tensor, step by step as 12.5 goes, by maps instead of a merge of lists.
+fn walk_layer(material: &Selvedge<'_>, level: u32, layer: u32, axes: [selvedge::position::Axis; 2], light: Taps, view: Taps, operations: &mut u64) -> [i32; 3] {
+    let (words, m) = (material.words(), material.material());
+    let start = lists_start(words, m, level, layer);
+    let (atom_count, shape) = (word(words, m.fibres_start), word(words, m.fibres_start + 1));
+    let ends = |axis: selvedge::position::Axis| match axis.count {
+        2 => vec![(axis.first.block, axis.first.weight_a_q15), (axis.second.block, axis.second.weight_a_q15)],
+        _ => vec![(axis.first.block, 32_768)],
+    };
+    let mut weights = std::collections::BTreeMap::<u32, i32>::new();
+    for (row, weight_y) in ends(axes[1]) {
+        for (column, weight_x) in ends(axes[0]) {
+            let mut list = open_list(words, start, atom_count, row * level_size(m.width, level) + column);
+            while list.index != LIST_END {
+                // A product, and one in halves.
+                *operations += 3;
+                let weight = weights.entry(list.index).or_default();
+                *weight = weight.wrapping_add(multiply_q15(list.coefficient * weight_x, weight_y));
+                list = next_coefficient(words, list);
+            }
+        }
+    }
+    let mut total = [0i32; 3];
+    let row = |index: u32| m.light_atoms_start + 2 + index * word(words, m.light_atoms_start);
+    let (entries, mask) = (shape & 0xff, (1u32 << (shape >> 8 & 0xff)) - 1);
+    for (atom, weight) in weights {
+        let mut sums = [0i32; 3];
+        for (view, weight) in [(view.a, view.weight_a_q15), (view.b, view.weight_b_q15), (view.c, view.weight_c_q15)] {
+            for n in 0..entries {
+                let entry = packed_i16(words, m.fibres_start + 2 + atom_count, (view * atom_count + atom) * entries + n) as u32 & 0xffff;
+                let (index, value) = (entry & mask, (entry & !mask) as u16 as i16 as i32);
+                // The entry's weight, three channels of three lights, and three products.
+                *operations += 13;
+                let h = (value * weight + (1 << 17)) >> 18;
+                for (c, sum) in sums.iter_mut().enumerate() {
+                    let at = |light: u32, weight: i32| ((word(words, row(light) + index) << (22 - c * 10)) as i32 >> 22) * weight;
+                    let u = (at(light.a, light.weight_a_q15) + at(light.b, light.weight_b_q15) + at(light.c, light.weight_c_q15) + 256) >> 9;
+                    *sum += h * u;
+                }
+            }
+        }
+        let shifts = word(words, m.fibres_start + 2 + atom);
+        *operations += 6;
+        for (total, sum) in total.iter_mut().zip(sums) {
+            let angular = clamp_magnitude(round_shift(sum, shifts & 31), 32_767);
+            *total = total.wrapping_add(round_shift(multiply_q15(weight, angular), shifts >> 5 & 31));
+        }
+    }
+    total.map(|total| clamp_magnitude(round_shift(total, word(words, start) >> 24), 1 << 27))
 }
 
 /// Candidates of the direction's cell up to the one that holds it, and all edges of the hull where none does.

@@ -110,7 +110,7 @@ fn an_enormous_dictionary() {
 #[test]
 fn many_layers_of_full_records() {
     for seed in 0..400 {
-        let file = write_material(&selvedge_tools::extreme::extreme_model(seed));
+        let file = write_material(&selvedge_tools::extreme::extreme_of_any_method(seed));
         let material = selvedge::open(&file, &Limits::NONE).expect("legal");
         if material.header().layer_count == 8 {
             dearest(&material);

@@ -5,7 +5,7 @@ use selvedge::direction::hull_start;
 use selvedge::ensemble::{coefficients_start, read_record};
 use selvedge::words::word;
 use selvedge::{Direction, Limits, Selvedge};
-use selvedge_tools::extreme::extreme_model;
+use selvedge_tools::extreme::{extreme_model, extreme_tensor};
 use selvedge_tools::model::{AtomModel, CoefficientsModel, FactorModel, MaterialModel, RecordModel, TransferModel};
 use selvedge_tools::random::Random;
 use selvedge_tools::write::{write_material, write_split};
@@ -93,6 +93,38 @@ const LIST: &[&str] = &[
     "between levels",
     "result: zero",
     "result: largest",
+    "tensor: no texture",
+    "tensor: one channel",
+    "tensor: three channels",
+    "light atoms: 1",
+    "light atoms: 256",
+    "light entry: -512",
+    "light entry: 511",
+    "entries: 1",
+    "entries: 32",
+    "ABRDF atoms: 1",
+    "ABRDF atoms: 1024",
+    "angular shift: 0",
+    "angular shift: 31",
+    "gain shift: 0",
+    "gain shift: 31",
+    "fibre value: -32768",
+    "fibre sum: 2^18",
+    "fibres: odd number of entries",
+    "list value bits: 1",
+    "list value bits: 15",
+    "list shift: 0",
+    "list shift: 31",
+    "list: empty",
+    "list: more than 31",
+    "list low bits: 0",
+    "list low bits: 9",
+    "list sum: 65534",
+    "lists: nothing in a layer",
+    "group: part of it outside the image",
+    "ABRDF atom: limited",
+    "layer: limited",
+    "tensor: external dictionary",
 ];
 
 fn of_model(model: &MaterialModel, seen: &mut BTreeSet<String>) {
@@ -106,8 +138,8 @@ fn of_model(model: &MaterialModel, seen: &mut BTreeSet<String>) {
     add("edge", model.edge as i64);
     add("lights", model.lights.len() as i64);
     model.matrix_q13.iter().for_each(|&entry| add("matrix", entry as i64));
-    for channel in &model.channels {
-        add("state", channel.state() as i64);
+    for (c, channel) in model.channels.iter().enumerate() {
+        add("state", model.state(c) as i64);
         if let Some(mean) = &channel.mean {
             add("mean shift", mean.shift as i64);
             mean.entries.iter().filter(|e| e.abs() == 32_767).for_each(|&e| add("mean entry", e as i64));
@@ -180,6 +212,71 @@ fn of_model(model: &MaterialModel, seen: &mut BTreeSet<String>) {
     }
 }
 
+/// What a sparse tensor has and its samples reach.
+fn of_tensor(tensor: &selvedge_tools::model::TensorModel, material: &Selvedge<'_>, seen: &mut BTreeSet<String>) {
+    use selvedge::tensor::{angular_q15, layer_q20, list_coefficient, list_low_bits};
+    let mut say = |holds: bool, what: &str| {
+        if holds {
+            seen.insert(what.to_owned());
+        }
+    };
+    let channels = tensor.channels.iter().filter(|&&full| full).count();
+    say(channels == 0, "tensor: no texture");
+    say(channels == 1, "tensor: one channel");
+    say(channels == 3, "tensor: three channels");
+    if channels == 0 {
+        return;
+    }
+    say(tensor.light_atoms == 1, "light atoms: 1");
+    say(tensor.light_atoms == 256, "light atoms: 256");
+    say(tensor.lights.iter().flatten().any(|&entry| entry == -512), "light entry: -512");
+    say(tensor.lights.iter().flatten().any(|&entry| entry == 511), "light entry: 511");
+    say(tensor.entries == 1, "entries: 1");
+    say(tensor.entries == 32, "entries: 32");
+    say(tensor.atoms.len() == 1, "ABRDF atoms: 1");
+    say(tensor.atoms.len() == 1024, "ABRDF atoms: 1024");
+    say(tensor.atoms.iter().any(|atom| atom.angular == 0), "angular shift: 0");
+    say(tensor.atoms.iter().any(|atom| atom.angular == 31), "angular shift: 31");
+    say(tensor.atoms.iter().any(|atom| atom.gain == 0), "gain shift: 0");
+    say(tensor.atoms.iter().any(|atom| atom.gain == 31), "gain shift: 31");
+    let index_bits = 32 - (tensor.light_atoms - 1).leading_zeros();
+    let value = |entry: &u16| (entry & !((1u32 << index_bits) - 1) as u16) as i16;
+    say(tensor.fibres.iter().any(|entry| value(entry) == -32_768), "fibre value: -32768");
+    let sum = |fibre: &[u16]| fibre.iter().map(|entry| value(entry).unsigned_abs() as u32).sum::<u32>();
+    say(tensor.fibres.chunks(tensor.entries as usize).any(|fibre| sum(fibre) == 1 << 18), "fibre sum: 2^18");
+    say(tensor.fibres.len() % 2 == 1, "fibres: odd number of entries");
+    let atom_bits = 32 - (tensor.atoms.len() as u32 - 1).leading_zeros();
+    for layer in tensor.lists.iter().flatten() {
+        say(layer.value_bits == 1, "list value bits: 1");
+        say(layer.value_bits == 15, "list value bits: 15");
+        say(layer.shift == 0, "list shift: 0");
+        say(layer.shift == 31, "list shift: 31");
+        say(layer.lists.iter().all(Vec::is_empty), "lists: nothing in a layer");
+        say(layer.lists.len() % 8 != 0, "group: part of it outside the image");
+        for list in &layer.lists {
+            say(list.is_empty(), "list: empty");
+            say(list.len() > 31, "list: more than 31");
+            let low_bits = list_low_bits(atom_bits, list.len() as u32);
+            say(!list.is_empty() && low_bits == 0, "list low bits: 0");
+            say(!list.is_empty() && low_bits == 9, "list low bits: 9");
+            let part =
+                |&(atom, value): &(u32, u16)| list_coefficient(value as u32, layer.value_bits).unsigned_abs().div_ceil(1 << tensor.atoms[atom as usize].gain);
+            say(list.iter().map(part).sum::<u32>() == 65_534, "list sum: 65534");
+        }
+    }
+    let (words, m) = (material.words(), material.material());
+    let mut random = Random::new(tensor.fibres.len() as u64);
+    for _ in 0..10 {
+        let mut direction = || Direction { x_q18: random.range(-262_144, 262_144) as i32, y_q18: random.range(-262_144, 262_144) as i32, z_q15: 9 };
+        let (light, view) = (material.locate_light(direction()), material.locate_view(direction()));
+        let angular = angular_q15(words, m, 0, tensor.atoms[0].angular, light, view);
+        say([angular.c0, angular.c1, angular.c2].iter().any(|c| c.abs() == 32_767), "ABRDF atom: limited");
+        let axis = |size: u32, at: u32| selvedge::position::axis_at_position(m.edge, m.edge_reciprocal_q18, size, at);
+        let texture = layer_q20(words, m, 0, 0, axis(m.width, random.word()), axis(m.height, random.word()), light, view);
+        say([texture.c0, texture.c1, texture.c2].iter().any(|c| c.abs() == 1 << 27), "layer: limited");
+    }
+}
+
 /// What the file and samples of it reach.
 fn of_samples(material: &Selvedge<'_>, seen: &mut BTreeSet<String>, seed: u64) {
     let mut say = |holds: bool, what: &str| {
@@ -190,7 +287,7 @@ fn of_samples(material: &Selvedge<'_>, seen: &mut BTreeSet<String>, seed: u64) {
     let (m, words) = (*material.material(), material.words());
     say(word(words, m.light_start + 1) == 0, "triangles: none");
     say(word(words, m.light_start + 1) > 0, "triangles: some");
-    for channel in m.channels.iter().filter(|channel| channel.state == 2) {
+    for channel in m.channels.iter().filter(|channel| channel.state == 2 && channel.atoms_start != 0) {
         for layer in 0..m.layer_count {
             let start = coefficients_start(words, &m, *channel, 0, layer);
             for block in 0..word(words, start + 1).min(200) {
@@ -234,7 +331,7 @@ fn of_samples(material: &Selvedge<'_>, seen: &mut BTreeSet<String>, seed: u64) {
             let (fine, half) = (material.trilinear(0, u, 7, asked, view), material.trilinear(0x8000, u, 7, asked, view));
             say(fine != half, "between levels");
         }
-        for (c, channel) in m.channels.iter().enumerate().filter(|(_, channel)| channel.state == 2) {
+        for (c, channel) in m.channels.iter().enumerate().filter(|(_, channel)| channel.state == 2 && channel.atoms_start != 0) {
             let (x, y) = (axis, selvedge::position::axis_at_position(m.edge, m.edge_reciprocal_q18, m.height, 7));
             let block = y.first.block * selvedge::position::block_count(&m, m.width) + x.first.block;
             let record = read_record(words, coefficients_start(words, &m, *channel, 0, 0), block);
@@ -297,7 +394,7 @@ fn made() -> Vec<MaterialModel> {
 #[test]
 fn the_list_is_covered() {
     let mut seen = BTreeSet::new();
-    let models = (0..400).map(extreme_model).chain(made());
+    let models = (0..400).map(extreme_model).chain(made()).chain((0..150).map(extreme_tensor));
     for (seed, model) in (0u64..).zip(models) {
         of_model(&model, &mut seen);
         let file = write_material(&model);
@@ -322,10 +419,13 @@ fn the_list_is_covered() {
                 }
             }
         }
-        if seed < 40 && model.channels.iter().any(|channel| channel.ensemble.is_some()) {
+        if let Some(tensor) = &model.tensor {
+            of_tensor(tensor, &material, &mut seen);
+        }
+        if (seed < 40 || model.tensor.is_some() && seed % 4 == 0) && model.has_texture() {
             let (split, dictionary) = write_split(&model);
             selvedge::open_with(&split, Some(&dictionary), &Limits::NONE).expect("legal");
-            seen.insert("external dictionary".into());
+            seen.insert(if model.tensor.is_some() { "tensor: external dictionary" } else { "external dictionary" }.into());
         }
     }
     let missing: Vec<_> = LIST.iter().filter(|item| !seen.contains(**item)).collect();

@@ -4,7 +4,7 @@
 use selvedge::{Finding, First, Limits};
 use selvedge_tests::setting;
 use selvedge_tools::example::example_model;
-use selvedge_tools::extreme::extreme_model;
+use selvedge_tools::extreme::extreme_of_any_method;
 use selvedge_tools::random::Random;
 use selvedge_tools::write::{lay_out, repair_checksums, take_apart, write_material, write_split};
 
@@ -84,7 +84,7 @@ fn every_bit_flipped() {
 fn absurd_values_in_every_field() {
     let mut random = Random::new(3);
     for seed in [0u64, 1, 2, 3] {
-        let file = if seed == 0 { example() } else { write_material(&extreme_model(seed)) };
+        let file = if seed == 0 { example() } else { write_material(&extreme_of_any_method(seed)) };
         let step = (file.len() / 4 / setting("SELVEDGE_FIELDS", 700)).max(1);
         for at in (0..file.len() / 4).filter(|at| *at < 512 || at % step == 0).map(|at| at * 4) {
             let old = word(&file, at);
@@ -104,7 +104,7 @@ fn absurd_values_in_every_field() {
 fn random_damage() {
     let mut legal = 0;
     let count = setting("SELVEDGE_DAMAGE", 30_000);
-    let files: Vec<Vec<u8>> = (0..40).map(|seed| write_material(&extreme_model(seed))).filter(|file| file.len() < 40_000).chain([example()]).collect();
+    let files: Vec<Vec<u8>> = (0..40).map(|seed| write_material(&extreme_of_any_method(seed))).filter(|file| file.len() < 40_000).chain([example()]).collect();
     let mut random = Random::new(11);
     for i in 0..count {
         let mut file = files[i % files.len()].clone();
@@ -123,7 +123,7 @@ fn random_damage() {
 #[test]
 fn layout_is_canonical() {
     for seed in 0..60 {
-        let file = write_material(&extreme_model(seed));
+        let file = write_material(&extreme_of_any_method(seed));
         let (header, parts) = take_apart(&file);
         assert!(lay_out(header, parts) == file, "{seed}");
     }

@@ -5,7 +5,7 @@
 
 use selvedge::{Direction, Limits, Selvedge};
 use selvedge_tests::{excerpt_folder, full_data_folder, setting};
-use selvedge_tools::extreme::extreme_model;
+use selvedge_tools::extreme::extreme_of_any_method;
 use selvedge_tools::gpu::{Answer, Gpu, Query, answer_on_cpu, direction_words, random_query};
 use selvedge_tools::random::Random;
 use selvedge_tools::{example, gpu, sparsebtf, write};
@@ -34,13 +34,14 @@ fn real_files() -> Vec<(Vec<u8>, Vec<u8>)> {
         files.push((write::write_material(&model), Vec::new()));
     }
     files.push((write::write_material(&example::example_model()), Vec::new()));
+    files.push((write::write_material(&example::tensor_example_model()), Vec::new()));
     files
 }
 
 fn extreme_files() -> Vec<(Vec<u8>, Vec<u8>)> {
     let split = |seed: u64| {
-        let model = extreme_model(seed);
-        let has_texture = model.channels.iter().any(|channel| channel.ensemble.is_some());
+        let model = extreme_of_any_method(seed);
+        let has_texture = model.has_texture();
         if seed % 5 == 0 && has_texture { write::write_split(&model) } else { (write::write_material(&model), Vec::new()) }
     };
     let suite = selvedge_tests::targets::suite();

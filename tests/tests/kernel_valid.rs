@@ -1,9 +1,9 @@
 //! The assembled kernel is valid core WGSL, and its normative part has no float and no division.
 
 use naga::valid::{Capabilities, ValidationFlags, Validator};
-use selvedge_shaders::{Method, Request, assemble};
+use selvedge_shaders::{METHODS, Method, Request, assemble};
 
-const ALL: &[Method] = &[Method::SparseEnsemble];
+const ALL: &[Method] = &METHODS;
 
 fn parse(source: &str) -> naga::Module {
     naga::front::wgsl::parse_str(source).unwrap_or_else(|error| panic!("{}", error.emit_to_string(source)))
@@ -11,10 +11,13 @@ fn parse(source: &str) -> naga::Module {
 
 #[test]
 fn every_assembly_is_valid_without_extra_capabilities() {
-    for entries in [false, true] {
-        let module = parse(&assemble(&Request { methods: ALL, entries }));
+    for (entries, methods) in [false, true].into_iter().flat_map(|entries| [&[], &ALL[..1], &ALL[1..], ALL].map(|methods| (entries, methods))) {
+        let module = parse(&assemble(&Request { methods, entries }));
         Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module).expect("valid");
         assert_eq!(module.entry_points.len(), if entries { 5 } else { 0 });
+        // What is not asked for is not there.
+        let has = |name: &str| module.functions.iter().any(|(_, function)| function.name.as_deref() == Some(name));
+        assert_eq!((has("record_q20"), has("layer_q20")), (methods.contains(&Method::SparseEnsemble), methods.contains(&Method::SparseTensor)));
     }
 }
 

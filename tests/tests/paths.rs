@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use selvedge::batch::FilteredQuery;
 use selvedge::{Direction, Limits, Rgb, Selvedge};
 use selvedge_tools::example::example_model;
-use selvedge_tools::extreme::extreme_model;
+use selvedge_tools::extreme::extreme_of_any_method;
 use selvedge_tools::random::Random;
 use selvedge_tools::write::{write_material, write_split};
 
@@ -43,7 +43,7 @@ proptest! {
 
     #[test]
     fn extreme_files_decode_alike_on_every_path(seed in 0u64..1_000_000) {
-        let file = write_material(&extreme_model(seed));
+        let file = write_material(&extreme_of_any_method(seed));
         let material = selvedge::open(&file, &Limits::NONE).expect("legal");
         let mut random = Random::new(seed);
         batch_equals_plain(&material, &mut random, 70);
@@ -52,8 +52,8 @@ proptest! {
 
     #[test]
     fn an_external_dictionary_changes_nothing(seed in 0u64..1_000_000) {
-        let model = extreme_model(seed);
-        prop_assume!(model.channels.iter().any(|channel| channel.ensemble.is_some()));
+        let model = extreme_of_any_method(seed);
+        prop_assume!(model.has_texture());
         let whole = write_material(&model);
         let (file, dictionary) = write_split(&model);
         let whole = selvedge::open(&whole, &Limits::NONE).expect("legal");
@@ -67,13 +67,14 @@ proptest! {
     /// A prefix of the layers is a file of its own that decodes as the whole one limited to it.
     #[test]
     fn layers_are_prefixes(seed in 0u64..1_000_000, layers in 1u32..8) {
-        let mut model = extreme_model(seed);
+        let mut model = extreme_of_any_method(seed);
         let layers = layers.min(model.layer_count);
         let whole = write_material(&model);
         model.layer_count = layers;
         for ensemble in model.channels.iter_mut().filter_map(|channel| channel.ensemble.as_mut()) {
             ensemble.coefficients.iter_mut().for_each(|level| level.truncate(layers as usize));
         }
+        model.tensor.iter_mut().flat_map(|tensor| &mut tensor.lists).for_each(|level| level.truncate(layers as usize));
         let trimmed = write_material(&model);
         let whole = selvedge::open(&whole, &Limits::NONE).expect("legal").with_layers(layers);
         let trimmed = selvedge::open(&trimmed, &Limits::NONE).expect("legal");
@@ -83,7 +84,7 @@ proptest! {
     /// Weights of any direction sum to one and name directions that are there.
     #[test]
     fn weights_sum_to_one(seed in 0u64..1_000_000) {
-        let file = write_material(&extreme_model(seed));
+        let file = write_material(&extreme_of_any_method(seed));
         let material = selvedge::open(&file, &Limits::NONE).expect("legal");
         let mut random = Random::new(seed);
         for _ in 0..200 {
@@ -103,7 +104,7 @@ proptest! {
     /// A direction is inside one triangle, on a side of two, at a corner of several, or outside all; taps tell the place itself.
     #[test]
     fn a_direction_is_in_one_triangle_or_on_the_hull(seed in 0u64..1_000_000) {
-        let model = extreme_model(seed);
+        let model = extreme_of_any_method(seed);
         let file = write_material(&model);
         let material = selvedge::open(&file, &Limits::NONE).expect("legal");
         let triangles = selvedge_tools::triangulate::triangulate(&model.lights, None).triangles;
@@ -135,7 +136,7 @@ proptest! {
     /// A file, its model and a file again are the same bytes.
     #[test]
     fn decoding_and_encoding_is_the_identity(seed in 0u64..1_000_000) {
-        let file = write_material(&extreme_model(seed));
+        let file = write_material(&extreme_of_any_method(seed));
         let back = selvedge_tools::read::read_model(&file, None, &Limits::NONE).expect("legal");
         prop_assert!(write_material(&back) == file);
     }
@@ -145,7 +146,7 @@ proptest! {
 #[test]
 fn sample_directions_are_found() {
     for seed in 0..120 {
-        let model = extreme_model(seed);
+        let model = extreme_of_any_method(seed);
         let file = write_material(&model);
         let material = selvedge::open(&file, &Limits::NONE).expect("legal");
         for (i, &[x, y]) in model.lights.iter().enumerate() {
@@ -163,7 +164,7 @@ fn sample_directions_are_found() {
 #[test]
 fn the_place_on_the_hull_is_the_nearest() {
     for seed in 0..60 {
-        let model = extreme_model(seed);
+        let model = extreme_of_any_method(seed);
         let file = write_material(&model);
         let material = selvedge::open(&file, &Limits::NONE).expect("legal");
         let triangulation = selvedge_tools::triangulate::triangulate(&model.lights, None);
@@ -217,7 +218,7 @@ fn filtered_samples_meet_point_samples() {
 fn materials_are_shared_by_threads() {
     fn is_shareable<T: Send + Sync>() {}
     is_shareable::<Selvedge<'_>>();
-    let file = write_material(&extreme_model(8));
+    let file = write_material(&extreme_of_any_method(8));
     let material = selvedge::open(&file, &Limits::NONE).expect("legal");
     let digests: Vec<_> = std::thread::scope(|scope| {
         let threads: Vec<_> = (0..3).map(|_| scope.spawn(|| material.decode_digest())).collect();

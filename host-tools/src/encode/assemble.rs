@@ -134,6 +134,7 @@ pub fn material(setting: &Setting<'_>, ensembles: &[Ensemble; 3], candidates: &[
         lights: description.lights.iter().map(|&d| project(d)).collect(),
         views: (!same).then(|| description.views.iter().map(|&d| project(d)).collect()),
         channels,
+        tensor: None,
         extras: Vec::new(),
     };
     Ok((model, rounding))

@@ -1,13 +1,14 @@
 //! What is legal but unwise: bytes that nobody needs, directions that nearly fall together, prices that one block sets.
 
-use crate::read::record_coefficients;
+use crate::read::{list, record_coefficients};
 use rayon::prelude::*;
 use selvedge::Selvedge;
 use selvedge::cost::record_operations;
 use selvedge::direction::point;
 use selvedge::directory::{COEFFICIENTS, EXTERNAL, METADATA};
 use selvedge::ensemble::{coefficients_start, read_record};
-use selvedge::material::{CHANNEL_FULL, Channel, level_size};
+use selvedge::material::{CHANNEL_FULL, Channel, METHOD_SPARSE_TENSOR, level_size};
+use selvedge::tensor::lists_start;
 use selvedge::words::{Words, high_i16, low_i16, word};
 
 /// Something that a file had better not have.
@@ -72,7 +73,15 @@ pub fn walk(opened: &Selvedge<'_>, tell: &mut dyn FnMut(&Advice, u32, u32)) {
         directions(words, material.view_start, near, tell);
     }
     let own_dictionary = !opened.sections().any(|section| section.kind == EXTERNAL);
-    let full: Vec<Channel> = material.channels.iter().copied().filter(|channel| channel.state == CHANNEL_FULL).collect();
+    let is_tensor = material.method == METHOD_SPARSE_TENSOR;
+    if is_tensor && material.full_count > 0 && own_dictionary {
+        let used = uses_of_tensor(opened);
+        let mut unused = (0u32..).zip(&used).filter(|(_, used)| !**used).map(|(atom, _)| (material.fibres_start + 2 + atom) * 4);
+        if let Some(first) = unused.next() {
+            tell(unused_atoms, first, 1 + unused.count() as u32);
+        }
+    }
+    let full: Vec<Channel> = material.channels.iter().copied().filter(|channel| channel.state == CHANNEL_FULL && !is_tensor).collect();
     let seen: Vec<_> = full.par_iter().map(|channel| uses(opened, *channel)).collect();
     for (channel, (atoms, dictionaries)) in full.iter().zip(seen) {
         // Atoms are always in the material's own file, so a word's number is a fourth of its byte offset.
@@ -117,6 +126,22 @@ fn uses(opened: &Selvedge<'_>, channel: Channel) -> (Vec<Vec<Use>>, Vec<bool>) {
         }
     });
     (atoms, dictionaries)
+}
+
+/// Which ABRDF atoms of a sparse tensor are in a list.
+fn uses_of_tensor(opened: &Selvedge<'_>) -> Vec<bool> {
+    let (header, material, words) = (opened.header(), opened.material(), opened.words());
+    let mut used = vec![false; word(words, material.fibres_start) as usize];
+    for level in 0..header.level_count {
+        let texels: u32 = [header.width, header.height].iter().map(|&size| level_size(size, level)).product();
+        for layer in 0..header.layer_count {
+            let start = lists_start(words, material, level, layer);
+            for texel in 0..texels {
+                list(words, start, used.len() as u32, texel).iter().for_each(|&(atom, _)| used[atom as usize] = true);
+            }
+        }
+    }
+    used
 }
 
 /// First word of the section and number of each block, over levels and layers.

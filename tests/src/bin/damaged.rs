@@ -4,7 +4,7 @@
 
 use selvedge::Limits;
 use selvedge_tests::targets::suite;
-use selvedge_tools::extreme::extreme_model;
+use selvedge_tools::extreme::extreme_of_any_method;
 use selvedge_tools::files;
 use selvedge_tools::random::Random;
 use selvedge_tools::vectors::{Answer, Vector, answer, manifest};
@@ -22,7 +22,7 @@ fn main() {
     let valid: Vec<&Vector> = suite().iter().filter(|v| matches!(v.answer, Answer::Digest(_)) && v.dictionary.is_none() && v.bytes.len() < 20_000).collect();
     let mut vectors = Vec::new();
     for i in 0..count {
-        let mut bytes = if random.once_in(6) { write_material(&extreme_model(seed << 32 | i)) } else { random.pick(&valid).bytes.clone() };
+        let mut bytes = if random.once_in(6) { write_material(&extreme_of_any_method(seed << 32 | i)) } else { random.pick(&valid).bytes.clone() };
         for _ in 0..random.range(0, 3) {
             let at = random.range(0, bytes.len() as i64 / 4 - 1) as usize * 4;
             let old = u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);

@@ -1,0 +1,300 @@
+//! Batches and images of a sparse tensor: the same bits as a sample at a time, with the work shared.
+//!
+//! A sample of a batch blends all light atoms of its light once, in one place that stays in the cache, where the
+//! plain path blends one for every entry of a fibre. An image evaluates every ABRDF atom once, and a texel is then
+//! its list alone: that is what the order of products of 12.5 is for.
+
+use crate::colour::Values;
+use crate::direction::Taps;
+use crate::fixed::{clamp_magnitude, multiply_q15, round_shift};
+use crate::material::level_size;
+use crate::open::Selvedge;
+use crate::position::{Axis, axis_at_position};
+use crate::stream::window;
+use crate::tensor::{ANGULAR_BOUND, GROUP_TEXELS, LAYER_BOUND, blend_light, corner_weight, list_bits, list_coefficient, list_low_bits, lists_start};
+use crate::words::{DICTIONARY_START, Words, word};
+
+/// Three channels side by side, and one that is not used.
+type Lanes = [i32; 4];
+/// Light atoms at one light; as many as there can be, so that no index has to be checked.
+pub(crate) type LightTable = [Lanes; 256];
+
+/// The atoms of a material, as slices.
+struct Atoms<'a> {
+    /// Rows of words, one for each light.
+    lights: &'a [[u8; 4]],
+    light_atoms: usize,
+    /// Shifts of each ABRDF atom.
+    shifts: &'a [[u8; 4]],
+    fibres: &'a [[u8; 2]],
+    entries: usize,
+    index_mask: u16,
+}
+
+/// Bytes of the file that holds word `start`, from there on.
+fn bytes_from<'a>(words: Words<'a>, start: u32) -> &'a [u8] {
+    let file = if start < DICTIONARY_START { words.file } else { words.dictionary };
+    file.get(((start & 0x7fff_ffff) as usize).wrapping_mul(4)..).unwrap_or(&[])
+}
+
+impl<'a> Atoms<'a> {
+    fn of(selvedge: &Selvedge<'a>) -> Atoms<'a> {
+        let (words, material) = (selvedge.words(), selvedge.material());
+        let count = word(words, material.fibres_start) as usize;
+        let shape = word(words, material.fibres_start.wrapping_add(1));
+        let rest = bytes_from(words, material.fibres_start.wrapping_add(2)).as_chunks::<4>().0;
+        let shifts = rest.get(..count).unwrap_or(rest);
+        Atoms {
+            lights: bytes_from(words, material.light_atoms_start.wrapping_add(2)).as_chunks::<4>().0,
+            light_atoms: word(words, material.light_atoms_start) as usize,
+            shifts,
+            fibres: bytes_from(words, material.fibres_start.wrapping_add(2).wrapping_add(count as u32)).as_chunks::<2>().0,
+            entries: (shape & 0xff) as usize,
+            index_mask: (1u16 << ((shape >> 8) & 15)).wrapping_sub(1),
+        }
+    }
+
+    /// Every light atom between the lights of the taps (12.5-1).
+    #[inline(always)]
+    fn blend_lights(&self, light: Taps, table: &mut LightTable) {
+        let row = |index: u32| {
+            let start = (index as usize).wrapping_mul(self.light_atoms);
+            self.lights.get(start..start.wrapping_add(self.light_atoms)).unwrap_or(&[])
+        };
+        for (((slot, a), b), c) in table.iter_mut().zip(row(light.a)).zip(row(light.b)).zip(row(light.c)) {
+            let (a, b, c) = (u32::from_le_bytes(*a), u32::from_le_bytes(*b), u32::from_le_bytes(*c));
+            *slot = [blend_light(a, b, c, light, 0), blend_light(a, b, c, light, 1), blend_light(a, b, c, light, 2), 0];
+        }
+    }
+
+    /// An ABRDF atom between three views (12.5-2, 12.5-3), and its gain's shift.
+    #[inline(always)]
+    fn angular(&self, atom: u32, view: Taps, table: &LightTable) -> (Lanes, u32) {
+        let mut sums = [0i32; 4];
+        for (view, weight) in [(view.a, view.weight_a_q15), (view.b, view.weight_b_q15), (view.c, view.weight_c_q15)] {
+            let fibre = (view as usize).wrapping_mul(self.shifts.len()).wrapping_add(atom as usize).wrapping_mul(self.entries);
+            for entry in self.fibres.get(fibre..fibre.wrapping_add(self.entries)).unwrap_or(&[]) {
+                let entry = u16::from_le_bytes(*entry);
+                let index = entry & self.index_mask;
+                let value = (entry ^ index) as i16 as i32;
+                let h = value.wrapping_mul(weight).wrapping_add(0x20000) >> 18;
+                let Some(light) = table.get(index as usize) else { continue };
+                for (sum, u) in sums.iter_mut().zip(light) {
+                    *sum = sum.wrapping_add(h.wrapping_mul(*u));
+                }
+            }
+        }
+        let shifts = self.shifts.get(atom as usize).map_or(0, |bytes| u32::from_le_bytes(*bytes));
+        (sums.map(|sum| clamp_magnitude(round_shift(sum, shifts & 31), ANGULAR_BOUND)), (shifts >> 5) & 31)
+    }
+}
+
+/// The lists of a level and layer.
+struct Lists<'a> {
+    groups: &'a [[u8; 4]],
+    stream: &'a [u8],
+    value_bits: u32,
+    count_bits: u32,
+    index_bits: u32,
+    shift: u32,
+    atom_count: u32,
+}
+
+/// A list that is read from its begin.
+#[derive(Clone, Copy, Default)]
+struct Reader<'a> {
+    stream: &'a [u8],
+    left: u32,
+    low_bits: u32,
+    value_bits: u32,
+    field_bit: u32,
+    /// Where the window of high parts begins, its ones, and the first bit of the high parts plus the ones taken.
+    base: u32,
+    ones: u64,
+    taken: u32,
+}
+
+impl<'a> Lists<'a> {
+    fn of(selvedge: &Selvedge<'a>, level: u32, layer: u32) -> Lists<'a> {
+        let (words, material) = (selvedge.words(), selvedge.material());
+        let start = lists_start(words, material, level, layer);
+        let head = word(words, start);
+        let groups = (word(words, start.wrapping_add(1)).wrapping_add(7) >> 3) as usize;
+        let rest = bytes_from(words, start.wrapping_add(4));
+        Lists {
+            groups: rest.as_chunks::<4>().0.get(..groups).unwrap_or(&[]),
+            stream: rest.get(groups.wrapping_mul(4)..).unwrap_or(&[]),
+            value_bits: head & 0xff,
+            count_bits: (head >> 8) & 0xff,
+            index_bits: (head >> 16) & 0xff,
+            shift: head >> 24,
+            atom_count: word(words, material.fibres_start),
+        }
+    }
+
+    /// The list of a texel (12.4).
+    #[inline(always)]
+    fn list(&self, texel: u32) -> Reader<'a> {
+        let first = self.groups.get((texel >> 3) as usize).map_or(0, |bytes| u32::from_le_bytes(*bytes));
+        let mask = (1u64 << self.count_bits).wrapping_sub(1);
+        let mut counts = window(self.stream, first);
+        let mut bit = first.wrapping_add(self.count_bits.wrapping_mul(GROUP_TEXELS));
+        for _ in 0..texel & 7 {
+            bit = bit.wrapping_add(list_bits(self.index_bits, self.value_bits, self.atom_count, (counts & mask) as u32));
+            counts >>= self.count_bits & 15;
+        }
+        let count = (counts & mask) as u32;
+        let low_bits = list_low_bits(self.index_bits, count);
+        let highs = bit.wrapping_add(count.wrapping_mul(low_bits.wrapping_add(self.value_bits)));
+        let ones = if count == 0 { 0 } else { window(self.stream, highs) & (u64::MAX >> 8) };
+        Reader { stream: self.stream, left: count, low_bits, value_bits: self.value_bits, field_bit: bit, base: highs, ones, taken: highs }
+    }
+}
+
+impl Reader<'_> {
+    /// The next ABRDF atom and its coefficient; the end is above all atoms.
+    #[inline(always)]
+    fn next(&mut self) -> (u32, i32) {
+        if self.left == 0 {
+            return (u32::MAX, 0);
+        }
+        // A list has a bounded number of high bits (12.4-2), so this ends in a checked file; the bound is for others.
+        let mut steps = 0u32;
+        while self.ones == 0 && steps < 4 {
+            self.base = self.base.wrapping_add(56);
+            self.ones = window(self.stream, self.base) & (u64::MAX >> 8);
+            steps = steps.wrapping_add(1);
+        }
+        let high = self.base.wrapping_add(self.ones.trailing_zeros()).wrapping_sub(self.taken);
+        self.ones &= self.ones.wrapping_sub(1);
+        self.taken = self.taken.wrapping_add(1);
+        let field = window(self.stream, self.field_bit) as u32;
+        self.field_bit = self.field_bit.wrapping_add(self.low_bits).wrapping_add(self.value_bits);
+        self.left = self.left.wrapping_sub(1);
+        let low = field & (1u32 << (self.low_bits & 15)).wrapping_sub(1);
+        let value = (field >> (self.low_bits & 15)) & (1u32 << (self.value_bits & 15)).wrapping_sub(1);
+        ((high << (self.low_bits & 15)) | low, list_coefficient(value, self.value_bits & 15))
+    }
+}
+
+/// Two texels of an axis and their weights; the second has none where there is one texel.
+fn two_texels(axis: Axis) -> [(u32, i32); 2] {
+    if axis.count == 2 {
+        return [(axis.first.block, axis.first.weight_a_q15), (axis.second.block, axis.second.weight_a_q15)];
+    }
+    [(axis.first.block, crate::fixed::ONE_Q15), (axis.first.block, 0)]
+}
+
+/// The rest of 12.5-6 for the sums of a layer.
+fn to_q20(total: Lanes, shift: u32) -> Lanes {
+    total.map(|sum| clamp_magnitude(round_shift(sum, shift), LAYER_BOUND))
+}
+
+/// What is the same for all samples of a batch.
+pub(crate) struct TensorSampler<'a> {
+    atoms: Atoms<'a>,
+}
+
+impl<'a> TensorSampler<'a> {
+    pub fn new(selvedge: &Selvedge<'a>) -> Self {
+        TensorSampler { atoms: Atoms::of(selvedge) }
+    }
+
+    /// [`crate::tensor::textures_q20`] at level 0, the same bits.
+    pub fn textures(&self, selvedge: &Selvedge<'a>, u_q32: u32, v_q32: u32, light: Taps, view: Taps, table: &mut LightTable) -> Values {
+        let material = selvedge.material();
+        let axis = |size: u32, position: u32| two_texels(axis_at_position(material.edge, material.edge_reciprocal_q18, size, position));
+        let (x, y) = (axis(material.width, u_q32), axis(material.height, v_q32));
+        self.atoms.blend_lights(light, table);
+        let mut sums = [0i32; 4];
+        for layer in 0..material.layer_limit {
+            let lists = Lists::of(selvedge, 0, layer);
+            let mut readers = [Reader::default(); 4];
+            let mut heads = [(u32::MAX, 0i32); 4];
+            let mut weights = [(0i32, 0i32); 4];
+            for ((n, (reader, head)), weight) in readers.iter_mut().zip(heads.iter_mut()).enumerate().zip(weights.iter_mut()) {
+                let ((column, weight_x), (row, weight_y)) = (x[n & 1], y[n >> 1 & 1]);
+                if weight_x != 0 && weight_y != 0 {
+                    *reader = lists.list(row.wrapping_mul(material.width).wrapping_add(column));
+                    *head = reader.next();
+                    *weight = (weight_x, weight_y);
+                }
+            }
+            let mut total = [0i32; 4];
+            loop {
+                let atom = heads[0].0.min(heads[1].0).min(heads[2].0.min(heads[3].0));
+                if atom == u32::MAX {
+                    break;
+                }
+                let mut weight = 0i32;
+                for ((reader, head), (weight_x, weight_y)) in readers.iter_mut().zip(heads.iter_mut()).zip(weights) {
+                    if head.0 == atom {
+                        weight = weight.wrapping_add(corner_weight(head.1, weight_x, weight_y));
+                        *head = reader.next();
+                    }
+                }
+                let (angular, gain_shift) = self.atoms.angular(atom, view, table);
+                for (sum, angular) in total.iter_mut().zip(angular) {
+                    *sum = sum.wrapping_add(round_shift(multiply_q15(weight, angular), gain_shift));
+                }
+            }
+            for (sum, part) in sums.iter_mut().zip(to_q20(total, lists.shift)) {
+                *sum = sum.wrapping_add(part);
+            }
+        }
+        Values { c0: sums[0], c1: sums[1], c2: sums[2] }
+    }
+}
+
+/// Words of scratch for an image: four an ABRDF atom.
+pub(crate) fn image_scratch_len(selvedge: &Selvedge<'_>) -> usize {
+    let count = word(selvedge.words(), selvedge.material().fibres_start) as usize;
+    count.wrapping_mul(4)
+}
+
+/// The textures of one channel for every texel of a level, row by row.
+pub(crate) fn image_textures(
+    selvedge: &Selvedge<'_>,
+    channel: usize,
+    level: u32,
+    light: Taps,
+    view: Taps,
+    scratch: &mut [i32],
+    mut put: impl FnMut(usize, i32),
+) {
+    let material = selvedge.material();
+    let atoms = Atoms::of(selvedge);
+    let mut table = [[0i32; 4]; 256];
+    atoms.blend_lights(light, &mut table);
+    let values = scratch.as_chunks_mut::<4>().0;
+    for (atom, slot) in (0..atoms.shifts.len() as u32).zip(values.iter_mut()) {
+        let (angular, gain_shift) = atoms.angular(atom, view, &table);
+        *slot = [angular[0], angular[1], angular[2], gain_shift as i32];
+    }
+    let texels = level_size(material.width, level).wrapping_mul(level_size(material.height, level));
+    for texel in 0..texels {
+        let mut texture = 0i32;
+        for layer in 0..material.layer_limit {
+            let lists = Lists::of(selvedge, level, layer);
+            let mut reader = lists.list(texel);
+            let mut total = 0i32;
+            loop {
+                let (atom, coefficient) = reader.next();
+                if atom == u32::MAX {
+                    break;
+                }
+                let Some(&[c0, c1, c2, gain_shift]) = values.get(atom as usize) else { break };
+                let angular = if channel == 0 {
+                    c0
+                } else if channel == 1 {
+                    c1
+                } else {
+                    c2
+                };
+                total = total.wrapping_add(round_shift(multiply_q15(coefficient << 15, angular), gain_shift as u32));
+            }
+            texture = texture.wrapping_add(clamp_magnitude(round_shift(total, lists.shift), LAYER_BOUND));
+        }
+        put(texel as usize, texture);
+    }
+}
