@@ -16,7 +16,7 @@ use crate::open::Selvedge;
 use crate::position::{Axis, Span, axis_at_position, block_count};
 use crate::records::{Blend, Table, entry, for_each_coefficient, record_of};
 use crate::result::{BufferTooSmall, position_from_f32};
-use crate::tensor_paths::{LightTable, TensorSampler};
+use crate::tensor_paths::{Room, TensorSampler};
 use crate::words::{Words, high_i16, low_i16, word};
 
 /// A filtered sample to be made.
@@ -117,7 +117,7 @@ impl Selvedge<'_> {
     /// Words of scratch that [`Selvedge::sample_batch`] needs for `count` queries.
     pub fn batch_scratch_len(&self, count: usize) -> usize {
         if self.material().method == METHOD_SPARSE_TENSOR {
-            return self.ready_total() + size_of::<LightTable>() / 4;
+            return self.ready_total() + Room::WORDS + TensorSampler::scratch_len(self);
         }
         let per_query = QUERY_WORDS + 4 * (ITEM_WORDS + PART_WORDS);
         let shared = self.ready_total() + 6 * COLUMNS + 2 * COLUMNS * LANES + self.largest_record() * COEFFICIENT_WORDS;
@@ -210,18 +210,19 @@ impl Selvedge<'_> {
     /// The samples of a sparse tensor, one after the other. `None` if the scratch is too short.
     fn sample_tensor(&self, queries: &[FilteredQuery], scratch: &mut [i32], out: &mut [Rgb]) -> Option<()> {
         let (ready, rest) = scratch.split_at_mut_checked(self.ready_total())?;
-        let table: &mut LightTable = rest.as_chunks_mut::<4>().0.first_chunk_mut()?;
-        table.fill([0; 4]);
+        let (room, rest) = rest.split_at_mut_checked(Room::WORDS)?;
+        let (unpacked, _) = rest.split_at_mut_checked(TensorSampler::scratch_len(self))?;
+        let mut room = Room::new(room)?;
         let material = self.material();
         let (light, view) = ready.split_at_mut(self.ready_len(material.light_start).min(ready.len()));
         let lights = ReadySet::new(self.words(), material.light_start, light);
         let views = ReadySet::new(self.words(), material.view_start, view);
-        let sampler = TensorSampler::new(self);
+        let sampler = TensorSampler::new(self, unpacked);
         for (query, rgb) in queries.iter().zip(out) {
             let (light, view) = (lights.locate(query.light), views.locate(query.view));
             let mut textures = Values::default();
             if material.full_count > 0 {
-                textures = sampler.textures(self, query.u_q32, query.v_q32, light, view, table);
+                textures = sampler.textures(self, query.u_q32, query.v_q32, light, view, &mut room);
             }
             let [l0, l1, l2] = pack_taps(light);
             let [v0, v1, v2] = pack_taps(view);

@@ -146,14 +146,14 @@ pub fn light_entry(entry: u32, channel: u32) -> i32 {
     ((entry << (22u32.wrapping_sub(channel.wrapping_mul(10)))) as i32) >> 22
 }
 
-/// One channel of a light atom between three lights, Q15 (12.5-1).
+/// One channel of a light atom between three lights, Q14 (12.5-1).
 #[inline(always)]
 pub fn blend_light(a: u32, b: u32, c: u32, light: Taps, channel: u32) -> i32 {
     let part_a = light_entry(a, channel).wrapping_mul(light.weight_a_q15);
     let part_b = light_entry(b, channel).wrapping_mul(light.weight_b_q15);
     let part_c = light_entry(c, channel).wrapping_mul(light.weight_c_q15);
-    // 12.5-1: the sum is exact, within 2^24; from Q24 to Q15.
-    part_a.wrapping_add(part_b).wrapping_add(part_c).wrapping_add(256) >> 9
+    // 12.5-1: the sum is exact, within 2^24; from Q24 to Q14.
+    part_a.wrapping_add(part_b).wrapping_add(part_c).wrapping_add(512) >> 10
 }
 
 /// Adds one fibre of an ABRDF atom to its sums (12.5-2).
@@ -179,8 +179,8 @@ pub fn add_fibre(words: Words<'_>, material: &Material, atom: u32, view: u32, we
         let index = low_part(entry, index_bits);
         // 12.2-6: the value is the entry without its index.
         let value = ((entry.wrapping_sub(index) << 16) as i32) >> 16;
-        // 12.5-2: twelve fraction bits are left, so that the sums are exact.
-        let h = value.wrapping_mul(weight_q15).wrapping_add(0x20000) >> 18;
+        // 12.5-2: thirteen fraction bits are left, so that the sums are exact.
+        let h = value.wrapping_mul(weight_q15).wrapping_add(0x10000) >> 17;
         let a = word(words, row_a.wrapping_add(index));
         let b = word(words, row_b.wrapping_add(index));
         let c = word(words, row_c.wrapping_add(index));

@@ -11,13 +11,40 @@ use crate::material::level_size;
 use crate::open::Selvedge;
 use crate::position::{Axis, axis_at_position};
 use crate::stream::window;
-use crate::tensor::{ANGULAR_BOUND, GROUP_TEXELS, LAYER_BOUND, blend_light, corner_weight, list_bits, list_coefficient, list_low_bits, lists_start};
+use crate::tensor::{
+    ANGULAR_BOUND, GROUP_TEXELS, LAYER_BOUND, blend_light, corner_weight, light_entry, list_bits, list_coefficient, list_low_bits, lists_start,
+};
+use crate::tensor_set::FIBRE_LIMIT;
 use crate::words::{DICTIONARY_START, Words, word};
 
 /// Three channels side by side, and one that is not used.
 type Lanes = [i32; 4];
 /// Light atoms at one light; as many as there can be, so that no index has to be checked.
 pub(crate) type LightTable = [Lanes; 256];
+
+/// As many weights as there can be ABRDF atoms.
+const WEIGHTS: usize = 1024;
+
+/// What a sample works in. Weights are zero between samples.
+pub(crate) struct Room<'s> {
+    table: &'s mut LightTable,
+    weights: &'s mut [i32; WEIGHTS],
+}
+
+impl<'s> Room<'s> {
+    /// Words that it takes.
+    pub const WORDS: usize = size_of::<LightTable>() / 4 + WEIGHTS;
+
+    /// Of scratch that is long enough.
+    pub fn new(scratch: &'s mut [i32]) -> Option<Room<'s>> {
+        scratch.fill(0);
+        let (table, rest) = scratch.split_at_mut_checked(size_of::<LightTable>() / 4)?;
+        Some(Room { table: table.as_chunks_mut::<4>().0.first_chunk_mut()?, weights: rest.first_chunk_mut()? })
+    }
+}
+
+/// Entries of a fibre that are weighed at once.
+const GROUP: usize = 8;
 
 /// The atoms of a material, as slices.
 struct Atoms<'a> {
@@ -55,7 +82,6 @@ impl<'a> Atoms<'a> {
     }
 
     /// Every light atom between the lights of the taps (12.5-1).
-    #[inline(always)]
     fn blend_lights(&self, light: Taps, table: &mut LightTable) {
         let row = |index: u32| {
             let start = (index as usize).wrapping_mul(self.light_atoms);
@@ -67,26 +93,76 @@ impl<'a> Atoms<'a> {
         }
     }
 
+    /// Words that [`Atoms::unpack_lights`] fills.
+    fn unpacked_len(&self, light_count: u32) -> usize {
+        self.light_atoms.wrapping_mul(light_count as usize).wrapping_mul(4)
+    }
+
+    /// Entries of light atoms as four words.
+    fn unpack_lights(&self, unpacked: &mut [i32]) {
+        for (slot, entry) in unpacked.as_chunks_mut::<4>().0.iter_mut().zip(self.lights) {
+            let entry = u32::from_le_bytes(*entry);
+            *slot = [light_entry(entry, 0), light_entry(entry, 1), light_entry(entry, 2), 0];
+        }
+    }
+
+    /// [`Atoms::blend_lights`] from unpacked entries.
+    #[inline(always)]
+    fn blend_unpacked(&self, unpacked: &[i32], light: Taps, table: &mut LightTable) {
+        let length = self.light_atoms.wrapping_mul(4);
+        let row = |index: u32| {
+            let start = (index as usize).wrapping_mul(length);
+            unpacked.get(start..start.wrapping_add(length)).unwrap_or(&[])
+        };
+        for (((slot, a), b), c) in table.as_flattened_mut().iter_mut().zip(row(light.a)).zip(row(light.b)).zip(row(light.c)) {
+            let sum = a.wrapping_mul(light.weight_a_q15).wrapping_add(b.wrapping_mul(light.weight_b_q15));
+            *slot = sum.wrapping_add(c.wrapping_mul(light.weight_c_q15)).wrapping_add(512) >> 10;
+        }
+    }
+
     /// An ABRDF atom between three views (12.5-2, 12.5-3), and its gain's shift.
     #[inline(always)]
     fn angular(&self, atom: u32, view: Taps, table: &LightTable) -> (Lanes, u32) {
-        let mut sums = [0i32; 4];
+        // First all weights and places, eight side by side; what is read behind a fibre is not used.
+        let mut weights = [0i32; 3 * FIBRE_LIMIT as usize];
+        let mut places = [0u16; 3 * FIBRE_LIMIT as usize];
+        let stride = self.entries.next_multiple_of(GROUP).min(FIBRE_LIMIT as usize);
+        let mut slots = weights.as_chunks_mut::<GROUP>().0.iter_mut().zip(places.as_chunks_mut::<GROUP>().0);
         for (view, weight) in [(view.a, view.weight_a_q15), (view.b, view.weight_b_q15), (view.c, view.weight_c_q15)] {
-            let fibre = (view as usize).wrapping_mul(self.shifts.len()).wrapping_add(atom as usize).wrapping_mul(self.entries);
-            for entry in self.fibres.get(fibre..fibre.wrapping_add(self.entries)).unwrap_or(&[]) {
-                let entry = u16::from_le_bytes(*entry);
-                let index = entry & self.index_mask;
-                let value = (entry ^ index) as i16 as i32;
-                let h = value.wrapping_mul(weight).wrapping_add(0x20000) >> 18;
-                let Some(light) = table.get(index as usize) else { continue };
+            let first = (view as usize).wrapping_mul(self.shifts.len()).wrapping_add(atom as usize).wrapping_mul(self.entries);
+            let mut rest = self.fibres.get(first..).unwrap_or(&[]);
+            for (weights, places) in slots.by_ref().take(stride / GROUP) {
+                let group = match rest.first_chunk::<GROUP>() {
+                    Some(group) => group.map(u16::from_le_bytes),
+                    None => last_group(rest),
+                };
+                *weights = group.map(|entry| ((entry & !self.index_mask) as i16 as i32).wrapping_mul(weight).wrapping_add(0x10000) >> 17);
+                *places = group.map(|entry| entry & self.index_mask & 0xff);
+                rest = rest.get(GROUP..).unwrap_or(&[]);
+            }
+        }
+        let mut sums = [0i32; 4];
+        for view in 0..3 {
+            let from = stride.wrapping_mul(view);
+            let (weights, places) = (weights.get(from..).unwrap_or(&[]), places.get(from..).unwrap_or(&[]));
+            for (weight, place) in weights.iter().zip(places).take(self.entries) {
+                let light = &table[(*place & 0xff) as usize];
                 for (sum, u) in sums.iter_mut().zip(light) {
-                    *sum = sum.wrapping_add(h.wrapping_mul(*u));
+                    *sum = sum.wrapping_add(weight.wrapping_mul(*u));
                 }
             }
         }
         let shifts = self.shifts.get(atom as usize).map_or(0, |bytes| u32::from_le_bytes(*bytes));
         (sums.map(|sum| clamp_magnitude(round_shift(sum, shifts & 31), ANGULAR_BOUND)), (shifts >> 5) & 31)
     }
+}
+
+/// The group of a fibre that ends less than a group before the file does.
+#[cold]
+fn last_group(rest: &[[u8; 2]]) -> [u16; GROUP] {
+    let mut group = [0; GROUP];
+    group.iter_mut().zip(rest).for_each(|(slot, entry)| *slot = u16::from_le_bytes(*entry));
+    group
 }
 
 /// The lists of a level and layer.
@@ -191,58 +267,69 @@ fn to_q20(total: Lanes, shift: u32) -> Lanes {
 }
 
 /// What is the same for all samples of a batch.
-pub(crate) struct TensorSampler<'a> {
+pub(crate) struct TensorSampler<'a, 's> {
     atoms: Atoms<'a>,
+    lights: &'s [i32],
 }
 
-impl<'a> TensorSampler<'a> {
-    pub fn new(selvedge: &Selvedge<'a>) -> Self {
-        TensorSampler { atoms: Atoms::of(selvedge) }
+impl<'a, 's> TensorSampler<'a, 's> {
+    /// Words of scratch: unpacked light atoms.
+    pub fn scratch_len(selvedge: &Selvedge<'a>) -> usize {
+        if selvedge.material().full_count == 0 { 0 } else { Atoms::of(selvedge).unpacked_len(selvedge.material().light_count) }
+    }
+
+    /// With scratch of the length that was asked for.
+    pub fn new(selvedge: &Selvedge<'a>, scratch: &'s mut [i32]) -> Self {
+        let atoms = Atoms::of(selvedge);
+        atoms.unpack_lights(scratch);
+        TensorSampler { atoms, lights: scratch }
     }
 
     /// [`crate::tensor::textures_q20`] at level 0, the same bits.
-    pub fn textures(&self, selvedge: &Selvedge<'a>, u_q32: u32, v_q32: u32, light: Taps, view: Taps, table: &mut LightTable) -> Values {
+    pub fn textures(&self, selvedge: &Selvedge<'a>, u_q32: u32, v_q32: u32, light: Taps, view: Taps, room: &mut Room<'_>) -> Values {
+        let Room { table, weights } = room;
         let material = selvedge.material();
         let axis = |size: u32, position: u32| two_texels(axis_at_position(material.edge, material.edge_reciprocal_q18, size, position));
         let (x, y) = (axis(material.width, u_q32), axis(material.height, v_q32));
-        self.atoms.blend_lights(light, table);
+        self.atoms.blend_unpacked(self.lights, light, table);
         let mut sums = [0i32; 4];
         for layer in 0..material.layer_limit {
             let lists = Lists::of(selvedge, 0, layer);
-            let mut readers = [Reader::default(); 4];
-            let mut heads = [(u32::MAX, 0i32); 4];
-            let mut weights = [(0i32, 0i32); 4];
-            for ((n, (reader, head)), weight) in readers.iter_mut().zip(heads.iter_mut()).enumerate().zip(weights.iter_mut()) {
-                let ((column, weight_x), (row, weight_y)) = (x[n & 1], y[n >> 1 & 1]);
-                if weight_x != 0 && weight_y != 0 {
-                    *reader = lists.list(row.wrapping_mul(material.width).wrapping_add(column));
-                    *head = reader.next();
-                    *weight = (weight_x, weight_y);
+            // The weights of all ABRDF atoms that the four lists have; where they stand needs no merge, since sums have no order.
+            let mut used = [0u64; WEIGHTS / 64];
+            for (row, weight_y) in y {
+                for (column, weight_x) in x {
+                    if weight_x == 0 || weight_y == 0 {
+                        continue;
+                    }
+                    let mut reader = lists.list(row.wrapping_mul(material.width).wrapping_add(column));
+                    for _ in 0..reader.left {
+                        let (atom, coefficient) = reader.next();
+                        let atom = atom as usize & (WEIGHTS - 1);
+                        used[atom >> 6] |= 1 << (atom & 63);
+                        weights[atom] = weights[atom].wrapping_add(corner_weight(coefficient, weight_x, weight_y));
+                    }
                 }
             }
             let mut total = [0i32; 4];
-            loop {
-                let atom = heads[0].0.min(heads[1].0).min(heads[2].0.min(heads[3].0));
-                if atom == u32::MAX {
-                    break;
-                }
-                let mut weight = 0i32;
-                for ((reader, head), (weight_x, weight_y)) in readers.iter_mut().zip(heads.iter_mut()).zip(weights) {
-                    if head.0 == atom {
-                        weight = weight.wrapping_add(corner_weight(head.1, weight_x, weight_y));
-                        *head = reader.next();
+            for (word, &bits) in used.iter().enumerate() {
+                let mut bits = bits;
+                while bits != 0 {
+                    let atom = word << 6 | bits.trailing_zeros() as usize;
+                    bits &= bits.wrapping_sub(1);
+                    let weight = core::mem::take(&mut weights[atom & (WEIGHTS - 1)]);
+                    let (angular, gain_shift) = self.atoms.angular(atom as u32, view, table);
+                    for (sum, angular) in total.iter_mut().zip(angular) {
+                        *sum = sum.wrapping_add(round_shift(multiply_q15(weight, angular), gain_shift));
                     }
-                }
-                let (angular, gain_shift) = self.atoms.angular(atom, view, table);
-                for (sum, angular) in total.iter_mut().zip(angular) {
-                    *sum = sum.wrapping_add(round_shift(multiply_q15(weight, angular), gain_shift));
                 }
             }
             for (sum, part) in sums.iter_mut().zip(to_q20(total, lists.shift)) {
                 *sum = sum.wrapping_add(part);
             }
         }
-        Values { c0: sums[0], c1: sums[1], c2: sums[2] }
+        // The fourth lane is zero, which only the table knows: added here, it keeps all four in one vector.
+        Values { c0: sums[0].wrapping_add(sums[3]), c1: sums[1], c2: sums[2] }
     }
 }
 

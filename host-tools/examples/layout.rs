@@ -149,7 +149,7 @@ fn run(path: &Path, ratios: &[u64]) -> Result<()> {
     let ensembles = data.own_ensembles()?;
     let mut layout = data.layout(&ensembles, budgets.iter().max().copied().unwrap_or(whole) * REACH)?;
     eprintln!("the published layout is projected");
-    let mut components = pca::pca(&dataset, RANK)?;
+    let mut components = pca::pca(&dataset, pca::Domain::Log, RANK)?;
     eprintln!("{} components are found", components.rank());
 
     println!("\n### Equal bytes\n");

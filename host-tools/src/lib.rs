@@ -11,6 +11,7 @@
 //! | [`dictionary`], [`train`](mod@train), [`dictionary_file`] | ensembles in floats, their training, their files |
 //! | [`encode`](mod@encode), [`measure`] | data become a file for a goal; how far two materials are apart |
 //! | [`quantise`] | coefficients become integers |
+//! | [`tensor`] | the encoder of the sparse tensor |
 //! | [`read`], [`trim`](mod@trim), [`sector`] | a file becomes a model again, and a smaller one |
 //! | [`blend`](mod@blend), [`basis`] | a material between two |
 //! | [`story`], [`progress`] | the encoder's part of the demo; a line on a terminal |
@@ -58,6 +59,7 @@ pub mod sector;
 pub mod sparsebtf;
 pub mod story;
 pub mod synth;
+pub mod tensor;
 pub mod train;
 pub mod transfer;
 pub mod triangulate;

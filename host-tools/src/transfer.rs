@@ -54,6 +54,12 @@ impl Forward {
         Forward { transfer, scale, from_rgb: std::array::from_fn(|r| std::array::from_fn(|c| matrix.row(r)[c] as f32)) }
     }
 
+    /// The mixture alone: channels of values that are logarithms of base two, or radiances, already.
+    #[inline(always)]
+    pub fn mix(&self, v: [f32; 3]) -> [f32; 3] {
+        self.from_rgb.map(|m| (m[0] * v[0] + m[1] * v[1] + m[2] * v[2]) * self.scale)
+    }
+
     /// The three channels of one colour.
     #[inline(always)]
     pub fn channels(&self, rgb: [f32; 3]) -> [f32; 3] {

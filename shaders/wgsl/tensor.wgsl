@@ -123,13 +123,13 @@ fn light_entry(entry: u32, channel: u32) -> i32 {
     return i32(entry << (22u - channel * 10u)) >> 22u;
 }
 
-// One channel of a light atom between three lights, Q15 (12.5-1).
+// One channel of a light atom between three lights, Q14 (12.5-1).
 fn blend_light(a: u32, b: u32, c: u32, light: Taps, channel: u32) -> i32 {
     let part_a = light_entry(a, channel) * light.weight_a_q15;
     let part_b = light_entry(b, channel) * light.weight_b_q15;
     let part_c = light_entry(c, channel) * light.weight_c_q15;
-    // 12.5-1: the sum is exact, within 2^24; from Q24 to Q15.
-    return (part_a + part_b + part_c + 256) >> 9u;
+    // 12.5-1: the sum is exact, within 2^24; from Q24 to Q14.
+    return (part_a + part_b + part_c + 512) >> 10u;
 }
 
 // Adds one fibre of an ABRDF atom to its sums (12.5-2).
@@ -155,8 +155,8 @@ fn add_fibre(material: Material, atom: u32, view: u32, weight_q15: i32, light: T
         let index = low_part(entry, index_bits);
         // 12.2-6: the value is the entry without its index.
         let value = i32((entry - index) << 16u) >> 16u;
-        // 12.5-2: twelve fraction bits are left, so that the sums are exact.
-        let h = (value * weight_q15 + 0x20000) >> 18u;
+        // 12.5-2: thirteen fraction bits are left, so that the sums are exact.
+        let h = (value * weight_q15 + 0x10000) >> 17u;
         let a = word(row_a + index);
         let b = word(row_b + index);
         let c = word(row_c + index);

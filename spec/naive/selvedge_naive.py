@@ -1616,7 +1616,7 @@ class Tensor:
             total = 0
             for row, weight in zip(light.rows, light.weights):
                 total = i32(total + i32(self.light_atoms[row][index][channel] * weight))
-            result.append(i32(total + (1 << 8)) >> 9)
+            result.append(i32(total + (1 << 9)) >> 10)
         return result
 
 
@@ -1864,7 +1864,7 @@ class AngularAtoms:
             sums = [0, 0, 0]
             for row, weight in zip(self.view.rows, self.view.weights):
                 for index, value in self.tensor.fibres[row][atom]:
-                    h = i32(i32(value * weight) + (1 << 17)) >> 18
+                    h = i32(i32(value * weight) + (1 << 16)) >> 17
                     if h == 0:
                         continue
                     u = self.light_atom(index)

@@ -105,10 +105,10 @@ fn walk_layer(material: &Selvedge<'_>, level: u32, layer: u32, axes: [selvedge::
                 let (index, value) = (entry & mask, (entry & !mask) as u16 as i16 as i32);
                 // The entry's weight, three channels of three lights, and three products.
                 *operations += 13;
-                let h = (value * weight + (1 << 17)) >> 18;
+                let h = (value * weight + (1 << 16)) >> 17;
                 for (c, sum) in sums.iter_mut().enumerate() {
                     let at = |light: u32, weight: i32| ((word(words, row(light) + index) << (22 - c * 10)) as i32 >> 22) * weight;
-                    let u = (at(light.a, light.weight_a_q15) + at(light.b, light.weight_b_q15) + at(light.c, light.weight_c_q15) + 256) >> 9;
+                    let u = (at(light.a, light.weight_a_q15) + at(light.b, light.weight_b_q15) + at(light.c, light.weight_c_q15) + 512) >> 10;
                     *sum += h * u;
                 }
             }

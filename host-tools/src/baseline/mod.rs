@@ -53,7 +53,7 @@ impl Sums {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use crate::dataset::{Dataset, Description, Sample, Writer};
     use crate::directions;
     use crate::random::Random;

@@ -1,6 +1,6 @@
-//! Principal components of the logarithms: one matrix, a row for each texel and a column for each pair and colour.
+//! Principal components: one matrix, a row for each texel and a column for each pair and colour.
 //!
-//! The matrix holds `ln(x + e)` less its mean row (the mean ABRDF). Its leading singular vectors are found by block power
+//! The matrix holds `ln(x + e)`, or `x` itself, less its mean row (the mean ABRDF). Its leading singular vectors are found by block power
 //! iteration with a random start (Halko, Martinsson, Tropp 2011, algorithm 4.4); each iteration is one pass over the data,
 //! so that the matrix is never held. Both factors and the mean are quantised to 8 or 16 bits, a scale for each component
 //! and factor, and everything is counted. Singular values are in the factor over texels.
@@ -24,19 +24,46 @@ const BATCH: usize = 64;
 /// Widths that a factor can have, in bits.
 pub const WIDTHS: [u32; 2] = [8, 16];
 
+/// What the matrix holds of a radiance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Domain {
+    /// `ln(x + e)`, with the dataset's offset.
+    Log,
+    /// `x`.
+    Linear,
+}
+
+impl Domain {
+    /// Into the matrix.
+    #[inline(always)]
+    pub fn forward(self, x: f32, offset: f32) -> f32 {
+        if self == Domain::Log { LN_2 * log2(x + offset) } else { x }
+    }
+
+    /// Radiance again.
+    #[inline(always)]
+    pub fn back(self, y: f32, offset: f32) -> f32 {
+        (if self == Domain::Log { y.exp() - offset } else { y }).max(0.0)
+    }
+}
+
 /// The components of a dataset, and what was measured of them so far.
 pub struct Pca<'a> {
-    dataset: &'a Dataset,
-    mean: Vec<f32>,
-    /// `[texel][component]`.
-    of_texels: Vec<f32>,
-    /// `[pair and colour][component]`.
-    of_pairs: Vec<f32>,
+    /// The data.
+    pub dataset: &'a Dataset,
+    /// What the matrix holds.
+    pub domain: Domain,
+    /// Its mean row: `[view][light][colour]`.
+    pub mean: Vec<f32>,
+    /// `[texel][component]`: left singular vectors times singular values.
+    pub of_texels: Vec<f32>,
+    /// `[pair and colour][component]`: right singular vectors.
+    pub of_pairs: Vec<f32>,
     rank: usize,
     /// Square of each singular value.
-    energies: Vec<f64>,
+    pub energies: Vec<f64>,
     /// Sum of all squares of the matrix.
-    energy: f64,
+    pub energy: f64,
     measured: BTreeMap<(usize, u32), Row>,
 }
 
@@ -81,13 +108,13 @@ fn orthonormal(matrix: &[f64], columns: usize) -> Vec<f32> {
 ///
 /// # Errors
 /// If the data cannot be read.
-pub fn pca(dataset: &Dataset, max_rank: usize) -> Result<Pca<'_>> {
+pub fn pca(dataset: &Dataset, domain: Domain, max_rank: usize) -> Result<Pca<'_>> {
     let (texels, columns) = (dataset.description().texels(), dataset.description().texel_len());
     let offset = dataset.statistics().log_offset();
-    let ln = |x: f32| LN_2 * log2(x + offset);
+    let forward = |x: f32| domain.forward(x, offset);
     let sums = |_: usize, values: &[f32]| {
         let mut sum = vec![0.0f64; columns];
-        values.chunks(columns).for_each(|texel| sum.iter_mut().zip(texel).for_each(|(sum, &x)| *sum += ln(x) as f64));
+        values.chunks(columns).for_each(|texel| sum.iter_mut().zip(texel).for_each(|(sum, &x)| *sum += forward(x) as f64));
         sum
     };
     let add = |total: &mut Vec<f64>, sum: Vec<f64>| total.iter_mut().zip(sum).for_each(|(total, sum)| *total += sum);
@@ -100,7 +127,8 @@ pub fn pca(dataset: &Dataset, max_rank: usize) -> Result<Pca<'_>> {
     let mut random = Random::new(1);
     let start: Vec<f64> = (0..columns * wide).map(|_| random.range(-1_000_000, 1_000_000) as f64).collect();
     let mut q = orthonormal(&start, wide);
-    let centred = |values: &[f32]| -> Vec<f32> { values.chunks(columns).flat_map(|texel| texel.iter().zip(&mean).map(|(&x, mean)| ln(x) - mean)).collect() };
+    let centred =
+        |values: &[f32]| -> Vec<f32> { values.chunks(columns).flat_map(|texel| texel.iter().zip(&mean).map(|(&x, mean)| forward(x) - mean)).collect() };
     for _ in 0..PASSES {
         let work = |_: usize, values: &[f32]| {
             let matrix = centred(values);
@@ -136,7 +164,7 @@ pub fn pca(dataset: &Dataset, max_rank: usize) -> Result<Pca<'_>> {
     product(&mut of_texels, &projected, &turn.entries, [texels, wide, rank], false);
     let mut of_pairs = vec![0.0; columns * rank];
     product(&mut of_pairs, &q, &turn.entries, [columns, wide, rank], false);
-    Ok(Pca { dataset, mean, of_texels, of_pairs, rank, energies, energy, measured: BTreeMap::new() })
+    Ok(Pca { dataset, domain, mean, of_texels, of_pairs, rank, energies, energy, measured: BTreeMap::new() })
 }
 
 /// The first `rank` of `all` columns, each quantised to its largest magnitude and decoded again.
@@ -163,10 +191,15 @@ impl Pca<'_> {
         columns * width + 8 + rank as u64 * ((texels + columns) * width + 8)
     }
 
-    /// Error of the logarithms at a rank, without quantisation.
+    /// Error in its domain at a rank, without quantisation.
     pub fn predicted_rms(&self, rank: usize) -> f64 {
         let left = self.energy - self.energies[..rank].iter().sum::<f64>();
         (left.max(0.0) / (self.dataset.description().texels() * self.mean.len()) as f64).sqrt()
+    }
+
+    /// The error that belongs to the domain.
+    pub fn error(&self, row: &Row) -> f64 {
+        if self.domain == Domain::Log { row.log_rms } else { row.linear_rms }
     }
 
     /// Errors over all values, decoded from quantised factors and mean.
@@ -195,7 +228,7 @@ impl Pca<'_> {
                     product_bt(logs, &of_texels[first * rank..][..count * rank], &of_pairs, [count, rank, columns], true);
                 }
                 let mut sums = Sums::default();
-                values.iter().zip(logs).for_each(|(&wanted, log)| sums.compare(wanted, (log.exp() - offset).max(0.0), offset));
+                values.iter().zip(logs).for_each(|(&wanted, log)| sums.compare(wanted, self.domain.back(*log, offset), offset));
                 sums
             })
         };
@@ -203,6 +236,11 @@ impl Pca<'_> {
         let row = sums.row(self.bytes(rank, bits));
         self.measured.insert((rank, bits), row);
         Ok(row)
+    }
+
+    fn error_at(&mut self, rank: usize, bits: u32) -> Result<f64> {
+        let row = self.measure(rank, bits)?;
+        Ok(self.error(&row))
     }
 
     /// The better of both widths within a budget, or `None` if not even the mean fits.
@@ -216,7 +254,7 @@ impl Pca<'_> {
             if base <= bytes {
                 let rank = (((bytes - base) / (self.bytes(1, bits) - base)) as usize).min(self.rank);
                 let row = self.measure(rank, bits)?;
-                if best.is_none_or(|best| row.log_rms < best.row.log_rms) {
+                if best.is_none_or(|best| self.error(&row) < self.error(&best.row)) {
                     best = Some(Choice { rank, bits, row });
                 }
             }
@@ -224,17 +262,17 @@ impl Pca<'_> {
         Ok(best)
     }
 
-    /// The fewest bytes that reach an error of the logarithms, or `None` if all components found do not.
+    /// The fewest bytes that reach an error in its domain, or `None` if all components found do not.
     ///
     /// # Errors
     /// If the data cannot be read.
-    pub fn reach(&mut self, log_rms: f64) -> Result<Option<Choice>> {
+    pub fn reach(&mut self, rms: f64) -> Result<Option<Choice>> {
         let mut best: Option<Choice> = None;
         for bits in WIDTHS {
             // A wider one is of use only if it needs fewer bytes.
             let most = (0..=self.rank).rev().find(|&rank| best.is_none_or(|best| self.bytes(rank, bits) < best.row.bytes));
             let Some(most) = most else { continue };
-            if let Some(rank) = self.least_rank(bits, log_rms, most)? {
+            if let Some(rank) = self.least_rank(bits, rms, most)? {
                 best = Some(Choice { rank, bits, row: self.measure(rank, bits)? });
             }
         }
@@ -242,27 +280,27 @@ impl Pca<'_> {
     }
 
     /// The least rank up to `most` that reaches an error; errors fall with rank.
-    fn least_rank(&mut self, bits: u32, log_rms: f64, most: usize) -> Result<Option<usize>> {
-        let mut high = (0..most).find(|&rank| self.predicted_rms(rank) <= log_rms).unwrap_or(most);
+    fn least_rank(&mut self, bits: u32, rms: f64, most: usize) -> Result<Option<usize>> {
+        let mut high = (0..most).find(|&rank| self.predicted_rms(rank) <= rms).unwrap_or(most);
         let mut step = 1;
         let mut low = high;
-        while self.measure(high, bits)?.log_rms > log_rms {
+        while self.error_at(high, bits)? > rms {
             if high == most {
                 return Ok(None);
             }
             (low, high, step) = (high, (high + step).min(most), step * 2);
         }
         step = 1;
-        while low > 0 && self.measure(low, bits)?.log_rms <= log_rms {
+        while low > 0 && self.error_at(low, bits)? <= rms {
             (high, low, step) = (low, low.saturating_sub(step), step * 2);
         }
         // The least that reaches is above `low`, or is 0.
-        if self.measure(low, bits)?.log_rms <= log_rms {
+        if self.error_at(low, bits)? <= rms {
             return Ok(Some(low));
         }
         while high - low > 1 {
             let middle = (low + high) / 2;
-            if self.measure(middle, bits)?.log_rms <= log_rms { high = middle } else { low = middle }
+            if self.error_at(middle, bits)? <= rms { high = middle } else { low = middle }
         }
         Ok(Some(high))
     }
@@ -277,7 +315,7 @@ mod tests {
     fn components_explain_what_they_should_at_the_stated_bytes() {
         let folder = tempfile::tempdir().expect("a folder");
         let dataset = small(folder.path(), [21, 12]);
-        let mut pca = pca(&dataset, 12).expect("made");
+        let mut pca = pca(&dataset, Domain::Log, 12).expect("made");
         let errors: Vec<f64> = [0, 1, 2, 3].map(|rank| pca.measure(rank, 16).expect("measured").log_rms).to_vec();
         assert!(errors.windows(2).all(|pair| pair[1] < pair[0] * 0.95), "{errors:?}");
         assert!(errors[3] < 0.05 * errors[0], "{errors:?}");

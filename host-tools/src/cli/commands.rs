@@ -15,7 +15,7 @@ use crate::progress::Progress;
 use crate::sector::Sector;
 use crate::synth::{self, Mesostructure};
 use crate::trim::{Keep, Trim, trim};
-use crate::{files, measure::Place, picture, pyramid, read, train, write};
+use crate::{baseline::pca, files, measure::Place, picture, pyramid, read, tensor, train, write};
 use clap::{Args, Subcommand, ValueEnum};
 use selvedge::{Direction, Limits, Selvedge};
 use std::path::{Path, PathBuf};
@@ -312,6 +312,14 @@ enum Domain {
     Linear,
 }
 
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum Method {
+    /// Blocks of a few products of four columns (SparseBTF 2023)
+    SparseEnsemble,
+    /// Texels of a few ABRDF atoms, these of a few light atoms (Ruiters and Klein 2009)
+    SparseTensor,
+}
+
 #[derive(Args)]
 pub struct EncodeArgs {
     /// The dataset
@@ -364,11 +372,95 @@ pub struct EncodeArgs {
     /// Offset of the logarithm; a thousandth of the mean if not given
     #[arg(long, value_parser = parse_positive)]
     offset: Option<f64>,
+    /// How the material is stored
+    #[arg(long, value_enum, default_value = "sparse-ensemble")]
+    method: Method,
+    /// Sparse tensor: light atoms, ABRDF atoms, entries of a fibre and coefficients of a texel, as 64,128,8,10; chosen if not given
+    #[arg(long, value_parser = parse_shape)]
+    shape: Option<[usize; 4]>,
+    /// Sparse tensor: components that training works in; memory grows with them, not with the data
+    #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u16).range(1..=2048))]
+    rank: u16,
     /// Tell what was reached, as JSON, to stdout
     #[arg(long)]
     json: bool,
     #[command(flatten)]
     threads: Threads,
+}
+
+/// Four numbers in the ranges of chapter 12.
+fn parse_shape(text: &str) -> std::result::Result<[usize; 4], String> {
+    let numbers: Vec<usize> = text.split(',').map(|n| n.trim().parse().map_err(|_| format!("`{n}` is no number"))).collect::<std::result::Result<_, _>>()?;
+    let shape: [usize; 4] = numbers.try_into().map_err(|_| "four numbers: light atoms, ABRDF atoms, entries, coefficients".to_owned())?;
+    let most = [256, 1024, 32, 63];
+    if shape.iter().zip(most).all(|(n, most)| (1..=most).contains(n)) { Ok(shape) } else { Err(format!("1 to {most:?}")) }
+}
+
+/// What a sparse tensor reached.
+#[derive(serde::Serialize)]
+struct TensorReport {
+    bytes: usize,
+    ratio_to_binary16: f64,
+    operations: u32,
+    coefficients: usize,
+    shape: [usize; 4],
+    predicted_rms: f64,
+    /// Coefficients that were limited to the range of their atom.
+    limited: usize,
+    trained: tensor::fit::Trained,
+    metrics: Metrics,
+}
+
+fn encode_tensor(args: &EncodeArgs, data: &Dataset, coarser: &[Dataset]) -> Result<u8> {
+    let foreign = args.dictionary.is_some() || args.own_dictionaries.is_some() || args.edge.is_some() || args.coefficients.is_some();
+    if foreign || args.layers > 1 || args.offset.is_some() || args.operations.is_some() {
+        let options = "--dictionary, --own-dictionaries, --edge, --coefficients, --layers, --offset and --operations";
+        return Err(ToolError::Usage(format!("{options} are of --method sparse-ensemble")));
+    }
+    let domain = if args.transfer == Domain::Log { pca::Domain::Log } else { pca::Domain::Linear };
+    let goal = match (args.rmse, args.psnr, args.size) {
+        (Some(rms), ..) if args.domain == args.transfer => tensor::Goal::Rms(rms),
+        (Some(_), ..) => return Err(ToolError::Usage("--rmse needs --domain and --transfer to be the same with --method sparse-tensor".into())),
+        (_, Some(db), _) if args.transfer == Domain::Linear => tensor::Goal::Rms(data.statistics().largest as f64 / 10f64.powf(db / 20.0)),
+        (_, Some(_), _) => return Err(ToolError::Usage("--psnr needs --transfer linear with --method sparse-tensor".into())),
+        (_, _, Some(bytes)) => tensor::Goal::Size(bytes),
+        _ if args.shape.is_some() => tensor::Goal::All,
+        _ => return Err(ToolError::Usage("a goal is missing: --rmse, --psnr, --size, or --shape alone".into())),
+    };
+    let progress = Progress::new();
+    progress.tell("components", 0, 1);
+    let components = pca::pca(data, domain, args.rank as usize)?;
+    let training = tensor::fit::Training::default();
+    let shape = match args.shape {
+        Some([light_atoms, abrdf_atoms, entries, coefficients]) => tensor::fit::Shape { light_atoms, abrdf_atoms, entries, coefficients },
+        None => tensor::choose_shape(&components, 1 + coarser.len(), goal, training, |what, done, all| progress.tell(what, done, all)),
+    };
+    let options = tensor::Options { shape, goal, value_bits: args.value_bits.map(|bits| bits[0].min(15)), training };
+    let coarser: Vec<&Dataset> = coarser.iter().collect();
+    let encoded = tensor::encode(&components, &coarser, &options, |what, done, all| progress.tell(what, done, all))?;
+    let file = selvedge::open(&encoded.bytes, &Limits::NONE);
+    let file = file.map_err(|finding| ToolError::Mismatch(format!("the encoder wrote a file that breaks a rule: {finding}")))?;
+    let offset = data.statistics().log_offset();
+    let peak = Some(data.statistics().largest as f64);
+    let tell = |done, all| progress.tell("verifying", done, all);
+    let metrics = measure::compare(measure::Source::Data(data), measure::Source::File(&file, 0), data.description(), offset, peak, &tell)?;
+    progress.clear();
+    files::write(&args.output, &encoded.bytes)?;
+    if args.json {
+        let bytes = encoded.bytes.len();
+        print_json(&TensorReport {
+            bytes,
+            ratio_to_binary16: data.description().half_bytes() as f64 / bytes as f64,
+            operations: file.header().operations,
+            coefficients: encoded.coefficients,
+            shape: [shape.light_atoms, shape.abrdf_atoms, shape.entries, shape.coefficients],
+            predicted_rms: encoded.predicted_rms,
+            limited: encoded.limited,
+            trained: encoded.trained,
+            metrics,
+        })?;
+    }
+    Ok(0)
 }
 
 #[derive(serde::Serialize)]
@@ -384,6 +476,16 @@ struct EncodeReport {
 
 fn encode(args: EncodeArgs) -> Result<u8> {
     args.threads.apply();
+    if args.method == Method::SparseTensor {
+        let data = Dataset::open(&args.dataset)?;
+        let beside = files::folder_of(&args.output);
+        let temporary = tempfile::Builder::new().prefix(".selvedge-").tempdir_in(beside).map_err(ToolError::io(beside))?;
+        let coarser = pyramid::levels(&data, args.levels as usize, temporary.path())?;
+        return encode_tensor(&args, &data, &coarser);
+    }
+    if args.shape.is_some() {
+        return Err(ToolError::Usage("--shape is of --method sparse-tensor".into()));
+    }
     let wish = match (args.rmse, args.psnr, args.size, args.coefficients) {
         (Some(rms), ..) if args.domain == Domain::Log => Wish::LogRms(rms),
         (Some(rms), ..) => Wish::LinearRms(rms),

@@ -1,0 +1,424 @@
+//! The encoder of the sparse tensor (chapter 12): a dataset becomes a file for a goal in bytes or error.
+//!
+//! [`fit`](mod@fit) decomposes in floats as the paper does; [`integers`] turns light atoms and fibres into the numbers of a
+//! file. The texels are then coded against *those* numbers, from the data themselves, so that rounding of the atoms is made
+//! up for as far as coefficients can, and the error is known before anything is decoded.
+
+pub mod fit;
+pub mod integers;
+pub mod ksvd;
+
+use crate::baseline::pca::{Domain, Pca};
+use crate::dataset::Dataset;
+use crate::encode::assemble::mean_tables;
+use crate::error::{Result, ToolError};
+use crate::linear::{ordered, product_bt};
+use crate::model::{ChannelModel, ListsModel, MaterialModel, MetadataModel, TensorModel, TransferModel};
+use crate::transfer::{Forward, matrix_q13};
+use crate::triangulate::project;
+use crate::write::write_material;
+use fit::{Fit, Shape, Trained, Training, fit};
+use integers::{Atoms, Quantiser};
+use ksvd::{Pursuit, Rows, dot, gram, pursue};
+use rayon::prelude::*;
+use std::f64::consts::LN_2;
+
+/// What a file has to reach.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Goal {
+    /// Bytes of the whole file, at most.
+    Size(u64),
+    /// Root of the mean squared error in the domain that is coded: of `ln(x + offset)`, or of linear radiance.
+    Rms(f64),
+    /// As many coefficients as the shape allows, for every texel.
+    All,
+}
+
+/// How to encode.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// Sizes of the dictionaries and lists.
+    pub shape: Shape,
+    /// What to reach.
+    pub goal: Goal,
+    /// Bits of a coefficient; chosen by their worth if `None`.
+    pub value_bits: Option<u32>,
+    /// How long to train.
+    pub training: Training,
+}
+
+/// A finished file and what is known of it without decoding it.
+pub struct Encoded {
+    /// The material.
+    pub model: MaterialModel,
+    /// Its file.
+    pub bytes: Vec<u8>,
+    /// Coefficients of level 0.
+    pub coefficients: usize,
+    /// Predicted root mean squared error over level 0, in the domain that is coded, all rounding of stored numbers included.
+    pub predicted_rms: f64,
+    /// Coefficients beyond the range of their ABRDF atom, which were limited to it.
+    pub limited: usize,
+    /// What training found.
+    pub trained: Trained,
+}
+
+/// The transfer and offset that a domain is coded with.
+pub fn transfer_of(data: &Dataset, domain: Domain) -> TransferModel {
+    let statistics = data.statistics();
+    match domain {
+        Domain::Log => TransferModel::Log2 { offset: statistics.coded_offset() },
+        // Values below 16, so that a texture is far below its bound.
+        Domain::Linear => TransferModel::Linear { exponent: (statistics.largest.max(1e-30).log2().ceil() as i32 - 4).clamp(-60, 60) },
+    }
+}
+
+/// Products of every texel with all atoms, and its energy, both about the mean.
+struct Correlations {
+    /// `[texel][atom]`.
+    alpha: Vec<f32>,
+    energy: Vec<f64>,
+}
+
+/// Texels of a part of a pass.
+const BATCH: usize = 32;
+
+fn correlate(data: &Dataset, forward: &Forward, means: &[Vec<f32>; 3], atoms: &Rows) -> Result<Correlations> {
+    let (texels, columns, n) = (data.description().texels(), data.description().texel_len(), atoms.count());
+    let work = |batch: usize| -> Result<(Vec<f32>, Vec<f64>)> {
+        let count = BATCH.min(texels - batch * BATCH);
+        let (mut bytes, mut values) = (Vec::new(), vec![0.0f32; count * columns]);
+        data.read(batch * BATCH, count, &mut bytes, &mut values)?;
+        for texel in values.chunks_mut(columns) {
+            for (pair, rgb) in texel.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+                let channels = forward.channels(*rgb);
+                *rgb = std::array::from_fn(|c| channels[c] - means[c][pair]);
+            }
+        }
+        let mut alpha = vec![0.0; count * n];
+        product_bt(&mut alpha, &values, &atoms.values, [count, columns, n], false);
+        let energy = values.chunks(columns).map(|texel| dot(texel, texel)).collect();
+        Ok((alpha, energy))
+    };
+    let start = Correlations { alpha: Vec::with_capacity(texels * n), energy: Vec::with_capacity(texels) };
+    ordered(texels.div_ceil(BATCH), work, start, |all, _, (alpha, energy): (Vec<f32>, Vec<f64>)| {
+        all.alpha.extend(alpha);
+        all.energy.extend(energy);
+    })
+}
+
+/// The lists of a level and what they come to.
+struct Lists {
+    model: Vec<Vec<(u32, u16)>>,
+    /// Squared error in units of the channels.
+    error: f64,
+    count: usize,
+    limited: usize,
+}
+
+impl Correlations {
+    /// Codes every texel with what each coefficient is worth, and rounds.
+    fn lists(&self, gram: &[f64], quantiser: &Quantiser, pursuit: Pursuit) -> Lists {
+        let n = quantiser.atoms();
+        let of = |texel: usize| {
+            let alpha = &self.alpha[texel * n..][..n];
+            let code = pursue(alpha, self.energy[texel], gram, pursuit);
+            let mut limited = 0;
+            let mut list: Vec<(u32, u16)> = Vec::with_capacity(code.terms.len());
+            for &(atom, value) in &code.terms {
+                let (stored, is_limited) = quantiser.value(atom, value);
+                list.push((atom, stored));
+                limited += is_limited as usize;
+            }
+            list.sort_unstable();
+            let rounded: Vec<(usize, f64)> = list.iter().map(|&(atom, stored)| (atom as usize, quantiser.coefficient(atom, stored))).collect();
+            let mut error = self.energy[texel];
+            for &(a, x) in &rounded {
+                error -= 2.0 * x * alpha[a] as f64;
+                error += rounded.iter().map(|&(b, y)| x * y * gram[a * n + b]).sum::<f64>();
+            }
+            (list, error.max(0.0), limited)
+        };
+        let all: Vec<_> = (0..self.energy.len()).into_par_iter().map(of).collect();
+        let mut lists = Lists { model: Vec::with_capacity(all.len()), error: 0.0, count: 0, limited: 0 };
+        for (list, error, limited) in all {
+            lists.error += error;
+            lists.count += list.len();
+            lists.limited += limited;
+            lists.model.push(list);
+        }
+        lists
+    }
+}
+
+/// Widths of a value that are tried.
+const VALUE_BITS: std::ops::RangeInclusive<u32> = 5..=9;
+
+/// Encodes the components of a dataset, and its coarser levels of detail.
+///
+/// # Errors
+/// If the data cannot be read, or the goal cannot be met.
+pub fn encode(pca: &Pca<'_>, coarser: &[&Dataset], options: &Options, tell: impl FnMut(&str, usize, usize)) -> Result<Encoded> {
+    let fitted = fit(pca, options.shape, options.training, tell);
+    encode_fit(pca, &fitted, coarser, options)
+}
+
+/// Encodes a decomposition that is there.
+///
+/// # Errors
+/// As [`encode`].
+pub fn encode_fit(pca: &Pca<'_>, fitted: &Fit, coarser: &[&Dataset], options: &Options) -> Result<Encoded> {
+    let data = pca.dataset;
+    let description = data.description();
+    let transfer = transfer_of(data, pca.domain);
+    let forward = Forward::new(transfer);
+    let pairs = description.pairs();
+    // The mean in the channels: colours mix linearly, and so does what is subtracted.
+    let mut means: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; pairs]);
+    for (pair, rgb) in pca.mean.as_chunks::<3>().0.iter().enumerate() {
+        let mixed = forward.mix(into_units(*rgb, pca.domain));
+        (0..3).for_each(|c| means[c][pair] = mixed[c] as f64);
+    }
+    let (tables, decoded_means) = mean_tables(&means)?;
+    let light = {
+        let mut light = fitted.light.clone();
+        for rgb in light.values.as_chunks_mut::<3>().0 {
+            *rgb = forward.mix(into_units(*rgb, pca.domain));
+        }
+        light
+    };
+    let unit = match transfer {
+        TransferModel::Log2 { .. } => LN_2,
+        TransferModel::Linear { exponent } => 2f64.powi(exponent),
+    };
+    let values = (description.texels() * pairs * 3) as f64;
+    let wanted = |rms: f64| (rms / unit).powi(2) * values;
+
+    let levels: Vec<&Dataset> = std::iter::once(data).chain(coarser.iter().copied()).collect();
+    let bits: Vec<u32> = options.value_bits.map_or(VALUE_BITS.collect(), |bits| vec![bits]);
+    let mut largest = fitted.largest.clone();
+    let mut best: Option<(f64, Encoded)> = None;
+    let mut correlations: Option<(Atoms, Vec<f64>, Vec<Correlations>)> = None;
+    for value_bits in bits {
+        // Atoms are made for the range of their coefficients; coded anew these move a little, so it is done twice.
+        if correlations.is_none() {
+            for _ in 0..2 {
+                let atoms = Atoms::new(&light, &fitted.fibres, &largest, value_bits.max(8));
+                let rebuilt = atoms.rebuild();
+                let products = gram(&rebuilt);
+                let of_levels = levels.iter().map(|level| correlate(level, &forward, &decoded_means, &rebuilt)).collect::<Result<Vec<_>>>()?;
+                let quantiser = Quantiser::new(&atoms, 15);
+                let lists = of_levels[0].lists(&products, &quantiser, Pursuit { most: options.shape.coefficients, least_gain: 0.0 });
+                let mut seen = vec![0.0f64; largest.len()];
+                let coefficient = |&(atom, stored): &(u32, u16)| (atom as usize, quantiser.coefficient(atom, stored).abs());
+                lists.model.iter().flatten().map(coefficient).for_each(|(atom, c)| seen[atom] = seen[atom].max(c));
+                // Limited ones say that there is more; a little room for what other numbers of coefficients need.
+                largest = largest.iter().zip(&seen).map(|(&was, &now)| if now >= was * 0.999 { was * 1.25 } else { now.max(was * 1e-6) }).collect();
+                correlations = Some((atoms, products, of_levels));
+            }
+        }
+        let Some((atoms, products, of_levels)) = &correlations else { continue };
+        let quantiser = Quantiser::new(atoms, value_bits);
+        let attempt = |least_gain: f64| -> (MaterialModel, Vec<u8>, Lists) {
+            let pursuit = Pursuit { most: options.shape.coefficients, least_gain };
+            let mut lists: Vec<Lists> = of_levels.iter().map(|level| level.lists(products, &quantiser, pursuit)).collect();
+            let per_level: Vec<Vec<Vec<(u32, u16)>>> = lists.iter_mut().map(|lists| std::mem::take(&mut lists.model)).collect();
+            let (shifts, shift) = quantiser.shifts(&per_level);
+            let tensor = TensorModel {
+                channels: [true; 3],
+                light_atoms: atoms.light_atoms(),
+                lights: atoms.lights(),
+                entries: atoms.entries(),
+                atoms: shifts,
+                fibres: atoms.fibres(),
+                lists: per_level.into_iter().map(|lists| vec![ListsModel { value_bits, shift, lists }]).collect(),
+            };
+            let same = description.lights == description.views;
+            let model = MaterialModel {
+                size: description.size.map(|n| n as u32),
+                level_count: levels.len() as u32,
+                edge: 1,
+                layer_count: 1,
+                transfer,
+                cosine_included: description.cosine_included,
+                matrix_q13: matrix_q13(),
+                metadata: MetadataModel { texel_nm: description.texel_nm, frame: 0, image_origin: 0, primaries: 0, texts: description.texts.clone() },
+                lights: description.lights.iter().map(|&d| project(d)).collect(),
+                views: (!same).then(|| description.views.iter().map(|&d| project(d)).collect()),
+                channels: std::array::from_fn(|c| ChannelModel { mean: Some(tables[c].clone()), ..ChannelModel::default() }),
+                tensor: Some(tensor),
+                extras: Vec::new(),
+            };
+            let bytes = write_material(&model);
+            (model, bytes, lists.swap_remove(0))
+        };
+        // The least worth of a coefficient that still meets the goal: bisection over its logarithm.
+        let meets = |bytes: &[u8], lists: &Lists| match options.goal {
+            Goal::Size(size) => bytes.len() as u64 <= size,
+            Goal::Rms(rms) => lists.error <= wanted(rms),
+            Goal::All => true,
+        };
+        let energy = of_levels[0].energy.iter().sum::<f64>() / description.texels() as f64;
+        let mut found = attempt(0.0);
+        match options.goal {
+            Goal::All => {}
+            Goal::Size(_) if meets(&found.1, &found.2) => {}
+            Goal::Rms(_) if !meets(&found.1, &found.2) => continue,
+            _ => {
+                // For a size a higher worth meets it, for an error a lower one does.
+                let (mut low, mut high) = ((energy * 1e-9 + f64::MIN_POSITIVE).ln(), (energy * 10.0 + f64::MIN_POSITIVE).ln());
+                let mut met = None;
+                for _ in 0..14 {
+                    let middle = (low + high) / 2.0;
+                    let tried = attempt(middle.exp());
+                    let is_met = meets(&tried.1, &tried.2);
+                    let up = matches!(options.goal, Goal::Rms(_)) == is_met;
+                    if up {
+                        low = middle
+                    } else {
+                        high = middle
+                    }
+                    if is_met {
+                        met = Some(tried);
+                    }
+                }
+                match met {
+                    Some(met) => found = met,
+                    None if matches!(options.goal, Goal::Rms(_)) => {}
+                    None => continue,
+                }
+            }
+        }
+        let (model, bytes, lists) = found;
+        let predicted_rms = (lists.error / values).sqrt() * unit;
+        let worth = match options.goal {
+            Goal::Rms(_) => bytes.len() as f64,
+            Goal::Size(_) => predicted_rms,
+            // Bytes to the power at which error falls with them, about: no goal says what either is worth.
+            Goal::All => predicted_rms * (bytes.len() as f64).sqrt(),
+        };
+        let encoded = Encoded { model, bytes, coefficients: lists.count, predicted_rms, limited: lists.limited, trained: fitted.trained };
+        if best.as_ref().is_none_or(|(least, _)| worth < *least) {
+            best = Some((worth, encoded));
+        }
+    }
+    let goal = match options.goal {
+        Goal::Size(size) => format!("{size} bytes"),
+        Goal::Rms(rms) => format!("an error of {rms}"),
+        Goal::All => "a file".to_owned(),
+    };
+    best.map(|(_, encoded)| encoded).ok_or_else(|| ToolError::Usage(format!("{goal} cannot be reached with these sizes of dictionaries and lists")))
+}
+
+/// Sizes of dictionaries that are tried: light atoms and ABRDF atoms.
+pub const SIZES: [[usize; 2]; 3] = [[32, 64], [64, 128], [128, 256]];
+/// Lists and fibres of the trial from which their lengths are chosen.
+const TRIAL: [usize; 2] = [12, 20];
+
+/// Bytes that a file of this shape will have, about: its lists full, seven bits a value.
+fn estimated_bytes(data: &Dataset, levels: usize, shape: Shape) -> u64 {
+    let description = data.description();
+    let [lights, views] = [&description.lights, &description.views].map(Vec::len);
+    let fixed = 600 + 6 * (lights * views + lights) + 60 * (lights + if description.lights == description.views { 0 } else { views });
+    let texels: usize = (0..levels as u32).map(|level| description.size.iter().map(|&n| n.div_ceil(1 << level)).product::<usize>()).sum();
+    let index = (shape.abrdf_atoms as f64 / shape.coefficients as f64).log2().max(0.0) + 2.0;
+    let list = (shape.coefficients as f64 * (7.0 + index) + 9.0) / 8.0;
+    (fixed + 4 * lights * shape.light_atoms + 2 * views * shape.abrdf_atoms * shape.entries) as u64 + (texels as f64 * list) as u64
+}
+
+/// A shape for a goal, by the estimate of Ruiters and Klein (section 4.2): for some sizes of the dictionaries one
+/// decomposition with long fibres and lists is made, and the errors of shorter ones are read from it as sums of those of both steps.
+pub fn choose_shape(pca: &Pca<'_>, levels: usize, goal: Goal, training: Training, mut tell: impl FnMut(&str, usize, usize)) -> Shape {
+    let values = (pca.dataset.description().texels() * pca.mean.len()) as f64;
+    let training = Training { iterations: training.iterations.min(6), rounds: 1, ..training };
+    let mut best: Option<(f64, Shape)> = None;
+    for [light_atoms, abrdf_atoms] in SIZES {
+        let [entries, coefficients] = TRIAL;
+        let fitted = fit(pca, Shape { light_atoms, abrdf_atoms, entries, coefficients }, training, &mut tell);
+        for entries in 2..=entries {
+            for coefficients in 2..=coefficients {
+                let shape = Shape { light_atoms, abrdf_atoms, entries, coefficients };
+                let error = ((fitted.of_texels[coefficients] + fitted.of_fibres[entries]) / values).sqrt();
+                let bytes = estimated_bytes(pca.dataset, levels, shape);
+                // What misses the goal is worse than all that meet it, by how far it misses.
+                let worth = match goal {
+                    Goal::Size(size) if bytes > size => 1e30 * bytes as f64,
+                    Goal::Size(_) => error,
+                    Goal::Rms(rms) if error > rms => 1e30 * error,
+                    Goal::Rms(_) => bytes as f64,
+                    Goal::All => error * (bytes as f64).sqrt(),
+                };
+                if best.is_none_or(|(least, _)| worth < least) {
+                    best = Some((worth, shape));
+                }
+            }
+        }
+    }
+    // The estimate is rough: a little more room, of which the goal takes what it needs.
+    best.map_or(Shape { light_atoms: 64, abrdf_atoms: 128, entries: 8, coefficients: 10 }, |(_, shape)| Shape {
+        entries: shape.entries + 1,
+        coefficients: shape.coefficients + 3,
+        ..shape
+    })
+}
+
+/// Values of the components' domain in the units that channels are mixed of.
+fn into_units(rgb: [f32; 3], domain: Domain) -> [f32; 3] {
+    if domain == Domain::Log { rgb.map(|v| (v as f64 / LN_2) as f32) } else { rgb }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::baseline::pca::pca;
+    use crate::baseline::tests::small;
+    use crate::measure::{Source, compare};
+    use selvedge::Limits;
+
+    fn options(goal: Goal) -> Options {
+        let shape = Shape { light_atoms: 5, abrdf_atoms: 7, entries: 3, coefficients: 4 };
+        Options { shape, goal, value_bits: None, training: Training { iterations: 4, rounds: 2, seed: 1 } }
+    }
+
+    /// Decoded against the data, in the domain that was coded.
+    fn decoded(data: &Dataset, bytes: &[u8], domain: Domain) -> f64 {
+        let file = selvedge::open(bytes, &Limits::NONE).unwrap_or_else(|finding| panic!("{finding}"));
+        let metrics =
+            compare(Source::Data(data), Source::File(&file, 0), data.description(), data.statistics().log_offset(), None, &|_, _| ()).expect("compared");
+        if domain == Domain::Log { metrics.log_rms } else { metrics.linear_rms }
+    }
+
+    #[test]
+    fn what_is_predicted_is_decoded_and_goals_are_met() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let data = small(folder.path(), [21, 12]);
+        for domain in [Domain::Log, Domain::Linear] {
+            let components = pca(&data, domain, 12).expect("made");
+            let all = encode(&components, &[], &options(Goal::All), |_, _, _| ()).expect("encoded");
+            let found = decoded(&data, &all.bytes, domain);
+            // Below the prediction where what would be negative is decoded as zero.
+            let lowest = if domain == Domain::Log { 0.97 } else { 0.85 };
+            assert!((lowest..1.03).contains(&(found / all.predicted_rms)), "{domain:?}: {found} {}", all.predicted_rms);
+            assert!(found < 0.5 * components.predicted_rms(0), "{domain:?}: {found} {}", components.predicted_rms(0));
+            let size = all.bytes.len() as u64 - 100;
+            let smaller = encode(&components, &[], &options(Goal::Size(size)), |_, _, _| ()).expect("encoded");
+            assert!(smaller.bytes.len() as u64 <= size && smaller.predicted_rms >= all.predicted_rms * 0.99);
+            let rms = all.predicted_rms * 1.2;
+            let looser = encode(&components, &[], &options(Goal::Rms(rms)), |_, _, _| ()).expect("encoded");
+            assert!(looser.predicted_rms <= rms && looser.bytes.len() <= all.bytes.len());
+            assert!(encode(&components, &[], &options(Goal::Rms(rms * 1e-3)), |_, _, _| ()).is_err());
+            assert!(encode(&components, &[], &options(Goal::Size(500)), |_, _, _| ()).is_err());
+        }
+    }
+
+    #[test]
+    fn bytes_do_not_depend_on_threads() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let data = small(folder.path(), [9, 7]);
+        let with = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+            pool.install(|| encode(&pca(&data, Domain::Linear, 8).expect("made"), &[], &options(Goal::All), |_, _, _| ()).expect("encoded").bytes)
+        };
+        assert!(with(1) == with(2) && with(1) == with(3));
+    }
+}
