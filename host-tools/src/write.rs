@@ -311,6 +311,21 @@ impl BitWriter {
             self.length += 1;
         }
     }
+
+    /// Ascending positions and their values: low parts with values, then high parts in unary (10.4-4, 10.4-5). Gives the last high part.
+    fn push_list(&mut self, list: &[(u32, u16)], low_bits: u32, value_bits: u32) -> u32 {
+        for &(position, value) in list {
+            self.push(position, low_bits);
+            self.push(value as u32, value_bits);
+        }
+        let mut high = 0;
+        for &(position, _) in list {
+            self.push(0, (position >> low_bits) - high);
+            self.push(1, 1);
+            high = position >> low_bits;
+        }
+        high
+    }
 }
 
 /// Bits that hold `0 ..= largest`.
@@ -342,16 +357,7 @@ fn coefficients_bytes(coefficients: &CoefficientsModel, dictionaries: u32, large
         stream.push(record.dictionary, dictionary_bits);
         stream.push(record.shift, SHIFT_BITS);
         stream.push(low_bits, LOW_BITS_BITS);
-        for &(position, value) in list {
-            stream.push(position, low_bits);
-            stream.push(value as u32, coefficients.value_bits);
-        }
-        let mut high = 0;
-        for &(position, _) in list {
-            stream.push(0, (position >> low_bits) - high);
-            stream.push(1, 1);
-            high = position >> low_bits;
-        }
+        stream.push_list(list, low_bits, coefficients.value_bits);
     }
     let mut words = vec![coefficients.value_bits | dictionary_bits << 8 | count_bits << 16, coefficients.records.len() as u32, stream.length, largest];
     words.extend(starts);
@@ -384,16 +390,7 @@ fn lists_bytes(model: &ListsModel, atoms: u32, largest: u32) -> Vec<u8> {
         }
         for list in group.iter().filter(|list| !list.is_empty()) {
             let low_bits = list_low_bits(index_bits, list.len() as u32);
-            for &(index, value) in list {
-                stream.push(index, low_bits);
-                stream.push(value as u32, model.value_bits);
-            }
-            let mut high = 0;
-            for &(index, _) in list {
-                stream.push(0, (index >> low_bits) - high);
-                stream.push(1, 1);
-                high = index >> low_bits;
-            }
+            let high = stream.push_list(list, low_bits, model.value_bits);
             stream.push(0, ((atoms - 1) >> low_bits) - high);
         }
     }

@@ -85,7 +85,7 @@ thread_local! {
 }
 
 /// Work on the linear values of batches of texels, results in the order of the texels.
-fn pass<T: Send, A>(dataset: &Dataset, work: impl Fn(usize, &[f32]) -> T + Sync, total: A, mut fold: impl FnMut(&mut A, T)) -> Result<A> {
+pub(super) fn pass<T: Send, A>(dataset: &Dataset, work: impl Fn(usize, &[f32]) -> T + Sync, total: A, mut fold: impl FnMut(&mut A, T)) -> Result<A> {
     let (texels, columns) = (dataset.description().texels(), dataset.description().texel_len());
     let part = |i: usize| -> Result<T> {
         let count = BATCH.min(texels - i * BATCH);
@@ -167,8 +167,23 @@ pub fn pca(dataset: &Dataset, domain: Domain, max_rank: usize) -> Result<Pca<'_>
     Ok(Pca { dataset, domain, mean, of_texels, of_pairs, rank, energies, energy, measured: BTreeMap::new() })
 }
 
+/// Errors of texels that `decode` gives in the domain of the components.
+pub(super) fn decode_and_compare(pca: &Pca<'_>, bytes: u64, decode: &(dyn Fn(usize, &mut [f32]) + Sync)) -> Result<Row> {
+    let (columns, offset) = (pca.mean.len(), pca.dataset.statistics().log_offset());
+    let work = |first: usize, values: &[f32]| {
+        let mut decoded = vec![0.0; columns];
+        let mut sums = Sums::default();
+        for (i, texel) in values.chunks(columns).enumerate() {
+            decode(first + i, &mut decoded);
+            texel.iter().zip(&decoded).for_each(|(&wanted, &found)| sums.compare(wanted, pca.domain.back(found, offset), offset));
+        }
+        sums
+    };
+    Ok(pass(pca.dataset, work, Sums::default(), |total, sums| total.add(sums))?.row(bytes))
+}
+
 /// The first `rank` of `all` columns, each quantised to its largest magnitude and decoded again.
-fn quantised(factor: &[f32], all: usize, rank: usize, bits: u32) -> Vec<f32> {
+pub(super) fn quantised(factor: &[f32], all: usize, rank: usize, bits: u32) -> Vec<f32> {
     let most = ((1u32 << (bits - 1)) - 1) as f32;
     let mut largest = vec![0.0f32; rank];
     for row in factor.chunks(all) {

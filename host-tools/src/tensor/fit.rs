@@ -5,9 +5,9 @@
 //! rounds go on: texels are coded again with the atoms as the second step left them, ABRDF atoms solved anew for these
 //! codes, and their fibres coded again.
 
-use super::ksvd::{Code, Found, Pursuit, Rows, code_all, dot, first_atoms, gram, iterate, normalise, pursue};
+use super::ksvd::{Code, Found, Pursuit, Rows, code_all, code_with, first_atoms, gram, iterate, normalise};
 use crate::baseline::pca::Pca;
-use crate::linear::{ordered, product, product_bt};
+use crate::linear::{product, product_bt};
 
 /// How to decompose.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -114,21 +114,6 @@ fn fibre_samples(lifted: &Rows, views: usize, weights: &[f64]) -> Rows {
     samples
 }
 
-/// Codes of samples given by their products with atoms that are not of unit length.
-fn code_by(samples: &Rows, atoms: &Rows, gram: &[f64], most: usize) -> Vec<Code> {
-    let n = atoms.count();
-    let batch = 128;
-    let work = |b: usize| -> Result<Vec<Code>, std::convert::Infallible> {
-        let (first, count) = (b * batch, batch.min(samples.count() - b * batch));
-        let mut alpha = vec![0.0; count * n];
-        product_bt(&mut alpha, &samples.values[first * samples.dim..][..count * samples.dim], &atoms.values, [count, samples.dim, n], false);
-        let pursuit = Pursuit { most, least_gain: 0.0 };
-        Ok((0..count).map(|i| pursue(&alpha[i * n..][..n], dot(samples.row(first + i), samples.row(first + i)), gram, pursuit)).collect())
-    };
-    let Ok(codes) = ordered(samples.count().div_ceil(batch), work, Vec::new(), |all: &mut Vec<Code>, _, codes| all.extend(codes));
-    codes
-}
-
 /// Root of the energy of each atom's coefficients.
 fn uses(codes: &[Code], atoms: usize) -> Vec<f64> {
     let mut energy = vec![0.0f64; atoms];
@@ -199,7 +184,7 @@ pub fn fit(pca: &Pca<'_>, shape: Shape, training: Training, mut tell: impl FnMut
             let unweighted = unweigh(&fibre_codes, &weights);
             let rebuilt = rebuild(&light, &unweighted, shape.abrdf_atoms);
             let inside = project(&rebuilt, &pca.of_pairs, rank);
-            codes = code_by(&samples, &inside, &gram(&rebuilt), shape.coefficients);
+            codes = code_with(&samples, &inside, &gram(&rebuilt), pursuit);
             atoms = solve_atoms(&samples, &codes, shape.abrdf_atoms);
             // Unit length, as K-SVD has them; the codes take what they had.
             let lengths: Vec<f64> = (0..shape.abrdf_atoms).map(|a| normalise(atoms.row_mut(a))).collect();

@@ -154,12 +154,18 @@ pub fn pursue(alpha: &[f32], energy: f64, gram: &[f64], pursuit: Pursuit) -> Cod
 
 /// Codes all samples.
 pub fn code_all(samples: &Rows, atoms: &Rows, pursuit: Pursuit) -> Vec<Code> {
-    let (gram, n) = (gram(atoms), atoms.count());
+    code_with(samples, atoms, &gram(atoms), pursuit)
+}
+
+/// Codes all samples with products of the atoms that are given: where samples and atoms stand in a subspace, those of the atoms
+/// in the whole space.
+pub fn code_with(samples: &Rows, atoms: &Rows, gram: &[f64], pursuit: Pursuit) -> Vec<Code> {
+    let n = atoms.count();
     let work = |batch: usize| -> Result<Vec<Code>, std::convert::Infallible> {
         let (first, count) = (batch * BATCH, BATCH.min(samples.count() - batch * BATCH));
         let mut alpha = vec![0.0; count * n];
         product_bt(&mut alpha, &samples.values[first * samples.dim..][..count * samples.dim], &atoms.values, [count, samples.dim, n], false);
-        let of = |i: usize| pursue(&alpha[i * n..][..n], dot(samples.row(first + i), samples.row(first + i)), &gram, pursuit);
+        let of = |i: usize| pursue(&alpha[i * n..][..n], dot(samples.row(first + i), samples.row(first + i)), gram, pursuit);
         Ok((0..count).map(of).collect())
     };
     let Ok(codes) = ordered(samples.count().div_ceil(BATCH), work, Vec::new(), |all: &mut Vec<Code>, _, codes| all.extend(codes));
