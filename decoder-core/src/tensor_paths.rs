@@ -123,33 +123,34 @@ impl<'a> Atoms<'a> {
     /// An ABRDF atom between three views (12.5-2, 12.5-3), and its gain's shift.
     #[inline(always)]
     fn angular(&self, atom: u32, view: Taps, table: &LightTable) -> (Lanes, u32) {
-        // First all weights and places, eight side by side; what is read behind a fibre is not used.
-        let mut weights = [0i32; 3 * FIBRE_LIMIT as usize];
-        let mut places = [0u16; 3 * FIBRE_LIMIT as usize];
-        let stride = self.entries.next_multiple_of(GROUP).min(FIBRE_LIMIT as usize);
-        let mut slots = weights.as_chunks_mut::<GROUP>().0.iter_mut().zip(places.as_chunks_mut::<GROUP>().0);
+        // First all weights and places, eight side by side; what a group has behind its fibre is overwritten by the next, or not used.
+        let mut weights = [0i32; 3 * FIBRE_LIMIT as usize + GROUP];
+        let mut places = [0u16; 3 * FIBRE_LIMIT as usize + GROUP];
+        let mut filled = 0usize;
         for (view, weight) in [(view.a, view.weight_a_q15), (view.b, view.weight_b_q15), (view.c, view.weight_c_q15)] {
             let first = (view as usize).wrapping_mul(self.shifts.len()).wrapping_add(atom as usize).wrapping_mul(self.entries);
-            let mut rest = self.fibres.get(first..).unwrap_or(&[]);
-            for (weights, places) in slots.by_ref().take(stride / GROUP) {
+            let mut done = 0usize;
+            while done < self.entries {
+                let rest = self.fibres.get(first.wrapping_add(done)..).unwrap_or(&[]);
                 let group = match rest.first_chunk::<GROUP>() {
                     Some(group) => group.map(u16::from_le_bytes),
                     None => last_group(rest),
                 };
-                *weights = group.map(|entry| ((entry & !self.index_mask) as i16 as i32).wrapping_mul(weight).wrapping_add(0x10000) >> 17);
-                *places = group.map(|entry| entry & self.index_mask & 0xff);
-                rest = rest.get(GROUP..).unwrap_or(&[]);
+                let at = filled.wrapping_add(done);
+                let slots = (weights.get_mut(at..).and_then(<[i32]>::first_chunk_mut), places.get_mut(at..).and_then(<[u16]>::first_chunk_mut));
+                if let (Some(weights), Some(places)) = slots {
+                    *weights = group.map(|entry| ((entry & !self.index_mask) as i16 as i32).wrapping_mul(weight).wrapping_add(0x10000) >> 17);
+                    *places = group.map(|entry| entry & self.index_mask);
+                }
+                done = done.wrapping_add(GROUP);
             }
+            filled = filled.wrapping_add(self.entries);
         }
         let mut sums = [0i32; 4];
-        for view in 0..3 {
-            let from = stride.wrapping_mul(view);
-            let (weights, places) = (weights.get(from..).unwrap_or(&[]), places.get(from..).unwrap_or(&[]));
-            for (weight, place) in weights.iter().zip(places).take(self.entries) {
-                let light = &table[(*place & 0xff) as usize];
-                for (sum, u) in sums.iter_mut().zip(light) {
-                    *sum = sum.wrapping_add(weight.wrapping_mul(*u));
-                }
+        for (weight, place) in weights.iter().zip(&places).take(filled) {
+            let light = &table[(*place & 0xff) as usize];
+            for (sum, u) in sums.iter_mut().zip(light) {
+                *sum = sum.wrapping_add(weight.wrapping_mul(*u));
             }
         }
         let shifts = self.shifts.get(atom as usize).map_or(0, |bytes| u32::from_le_bytes(*bytes));
