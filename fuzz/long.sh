@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Every target for so many executions; appends executions, edges and the execution of the last new edge to ledger.tsv.
 #   fuzz/long.sh EXECUTIONS [TARGET...]
-# Without AddressSanitizer, which makes a target six to twenty times slower: no crate of this repository may have unsafe code, so it would
+# Without AddressSanitizer, which makes a target six to twenty times slower: no crate of this repository that a target runs may have unsafe code, so it would
 # look at dependencies alone. SANITIZER=address turns it on.
 set -euo pipefail
 cd "$(dirname "$0")"
