@@ -412,12 +412,15 @@ mod tests {
         }
     }
 
+    /// Name, texels, directions of light and view, and the value of a texel's number.
+    type Case = (&'static str, [usize; 2], usize, usize, fn(usize, usize) -> f32);
+
     /// Materials at the ends of what data can be: each encodes, opens, and is decoded to what was predicted.
     #[test]
     fn odd_data_are_encoded() {
         let folder = tempfile::tempdir().expect("a folder");
         let grid = crate::directions::grid(81).expect("known");
-        let cases: [(&str, [usize; 2], usize, usize, fn(usize, usize) -> f32); 9] = [
+        let cases: [Case; 9] = [
             ("one texel", [1, 1], 9, 6, |_, i| 0.5 + (i % 7) as f32 * 0.1),
             ("one direction", [5, 4], 1, 1, |t, i| 0.5 + ((t * 3 + i) % 5) as f32 * 0.1),
             ("one number", [1, 1], 1, 1, |_, _| 0.25),
