@@ -177,7 +177,7 @@ fn check_calls(check: &mut Check<'_, '_>, header: &Header) -> bool {
         let missing = called_for(header, external, kind, instance) == Call::Required && find_section(check, header, kind, instance).is_none();
         sound &= check.ensure(!missing, Rule::SectionMissing, HEADER_LENGTH, kind | instance << 16);
     };
-    for kind in [METADATA, EXTERNAL, DIRECTIONS, MEANS, SCALES, ANGULAR, SPATIAL, ATOMS] {
+    for kind in [METADATA, EXTERNAL, DIRECTIONS, MEANS, SCALES, ANGULAR, SPATIAL, ATOMS, LIGHT_ATOMS, FIBRES] {
         for instance in 0..3 {
             require(check, kind, instance);
         }
@@ -187,12 +187,6 @@ fn check_calls(check: &mut Check<'_, '_>, header: &Header) -> bool {
             for channel in 0..3 {
                 require(check, COEFFICIENTS, level << 8 | layer << 4 | channel);
             }
-        }
-    }
-    require(check, LIGHT_ATOMS, 0);
-    require(check, FIBRES, 0);
-    for level in 0..header.level_count {
-        for layer in 0..header.layer_count {
             require(check, LISTS, level << 8 | layer << 4);
         }
     }

@@ -21,6 +21,36 @@ const LANES: usize = 16;
 /// One number for each texel of a row of a block.
 type Lanes = [i32; LANES];
 
+/// How a texture becomes the value of its channel, for one light and view (8.3).
+#[derive(Clone, Copy)]
+struct Finish {
+    state: u32,
+    mean: i32,
+    /// The scale and its shift, if the channel has one.
+    scale: Option<(i32, u32)>,
+}
+
+impl Finish {
+    fn of(selvedge: &Selvedge<'_>, channel: Channel, light: Taps, view: Taps) -> Finish {
+        let (words, material) = (selvedge.words(), selvedge.material());
+        let mean = if channel.state == CHANNEL_MISSING { 0 } else { mean_q20(words, material, channel, light, view) };
+        let scaled = channel.scale_start != 0;
+        let scale = scaled.then(|| (scale_q15(words, material, channel, light, view), word(words, channel.scale_start.wrapping_add(1))));
+        Finish { state: channel.state, mean, scale }
+    }
+
+    #[inline(always)]
+    fn value(&self, texture: i32) -> i32 {
+        // A channel without texture has none, whatever its method gave; a missing one has a mean of zero.
+        let texture = match (self.state == CHANNEL_FULL, self.scale) {
+            (false, _) => 0,
+            (true, None) => texture,
+            (true, Some((scale, shift))) => scale_texture(texture, scale, shift),
+        };
+        clamp_magnitude(texture.wrapping_add(self.mean), VALUE_BOUND)
+    }
+}
+
 impl Selvedge<'_> {
     /// Texels of a level: width and height.
     pub fn image_size(&self, level: u32) -> [u32; 2] {
@@ -63,7 +93,16 @@ impl Selvedge<'_> {
         let texels = self.image_buffers(level, scratch.len(), out.len())?;
         let (light, view) = (self.locate_light(light), self.locate_view(view));
         let out = out.get_mut(..texels).unwrap_or(&mut []);
-        self.channel_image(channel.min(2), level, light, view, scratch, |at, value| {
+        let channel = channel.min(2);
+        if self.has_tensor() {
+            self.tensor_image(level, light, view, scratch, |at, values| {
+                if let (Some(slot), Some(&value)) = (out.get_mut(at), values.get(channel)) {
+                    *slot = value;
+                }
+            });
+            return Ok(());
+        }
+        self.channel_image(channel, level, light, view, scratch, |at, value| {
             if let Some(slot) = out.get_mut(at) {
                 *slot = value;
             }
@@ -79,6 +118,14 @@ impl Selvedge<'_> {
         let texels = self.image_buffers(level, scratch.len(), out.len())?;
         let (light, view) = (self.locate_light(light), self.locate_view(view));
         let out = out.get_mut(..texels).unwrap_or(&mut []);
+        if self.has_tensor() {
+            self.tensor_image(level, light, view, scratch, |at, [c0, c1, c2]| {
+                if let Some(slot) = out.get_mut(at) {
+                    *slot = radiance(self.material(), Values { c0, c1, c2 }, light);
+                }
+            });
+            return Ok(());
+        }
         // The buffer holds the channel values first, then what they become.
         self.channel_image(0, level, light, view, scratch, |at, value| {
             if let Some(slot) = out.get_mut(at) {
@@ -116,7 +163,19 @@ impl Selvedge<'_> {
         Ok(texels)
     }
 
-    /// Every texel of one channel, block by block.
+    /// Whether the textures are those of a sparse tensor, which gives all channels at once.
+    fn has_tensor(&self) -> bool {
+        self.material().method == METHOD_SPARSE_TENSOR && self.material().full_count > 0
+    }
+
+    /// The channel values of every texel of a sparse tensor.
+    fn tensor_image(&self, level: u32, light: Taps, view: Taps, scratch: &mut [i32], mut put: impl FnMut(usize, [i32; 3])) {
+        let level = level.min(self.material().level_count.wrapping_sub(1));
+        let [f0, f1, f2] = self.material().channels.map(|channel| Finish::of(self, channel, light, view));
+        tensor_paths::image_textures(self, level, light, view, scratch, |at, [t0, t1, t2]| put(at, [f0.value(t0), f1.value(t1), f2.value(t2)]));
+    }
+
+    /// Every texel of one channel of a sparse ensemble, block by block; of a channel without texture, of any method.
     #[inline(always)]
     fn channel_image(&self, number: usize, level: u32, light: Taps, view: Taps, scratch: &mut [i32], mut put: impl FnMut(usize, i32)) {
         let (words, material) = (self.words(), self.material());
@@ -124,25 +183,9 @@ impl Selvedge<'_> {
         let [width, height] = self.image_size(level);
         let texels = (width as usize).saturating_mul(height as usize);
         let Some(&channel) = material.channels.get(number) else { return };
-        if channel.state == CHANNEL_MISSING {
-            (0..texels).for_each(|at| put(at, 0));
-            return;
-        }
-        let mean = mean_q20(words, material, channel, light, view);
+        let finish = Finish::of(self, channel, light, view);
         if channel.state != CHANNEL_FULL {
-            let value = clamp_magnitude(mean, VALUE_BOUND);
-            (0..texels).for_each(|at| put(at, value));
-            return;
-        }
-        let scaled = channel.scale_start != 0;
-        let scale = if scaled { scale_q15(words, material, channel, light, view) } else { 0 };
-        let shift = if scaled { word(words, channel.scale_start.wrapping_add(1)) } else { 0 };
-        let value = |texture: i32| {
-            let texture = if scaled { scale_texture(texture, scale, shift) } else { texture };
-            clamp_magnitude(texture.wrapping_add(mean), VALUE_BOUND)
-        };
-        if material.method == METHOD_SPARSE_TENSOR {
-            tensor_paths::image_textures(self, number, level, light, view, scratch, |at, texture| put(at, value(texture)));
+            (0..texels).for_each(|at| put(at, finish.value(0)));
             return;
         }
         self.angular_products(channel, light, view, scratch);
@@ -162,7 +205,7 @@ impl Selvedge<'_> {
                 for (y, row) in (y0..height.min(y0.wrapping_add(edge))).zip(&sums) {
                     let at = (y as usize).wrapping_mul(width as usize).wrapping_add(x0 as usize);
                     for (x, &texture) in (x0..width.min(x0.wrapping_add(edge))).zip(row) {
-                        put(at.wrapping_add(x.wrapping_sub(x0) as usize), value(texture));
+                        put(at.wrapping_add(x.wrapping_sub(x0) as usize), finish.value(texture));
                     }
                 }
             }

@@ -23,9 +23,10 @@ pub(crate) fn record_of(words: Words<'_>, material: &Material, channel: Channel,
     read_record(words, coefficients_start(words, material, channel, level, layer), block)
 }
 
-/// Bytes of the file from a word on. Records and atoms are never in an external dictionary.
+/// Bytes of the file that holds word `start`, from there on.
 pub(crate) fn bytes_from<'a>(words: Words<'a>, start: u32) -> &'a [u8] {
-    words.file.get((start as usize).wrapping_mul(4)..).unwrap_or(&[])
+    let file = if start < crate::words::DICTIONARY_START { words.file } else { words.dictionary };
+    file.get(((start & 0x7fff_ffff) as usize).wrapping_mul(4)..).unwrap_or(&[])
 }
 
 /// The atoms of dictionary `dictionary`: pairs of words.
@@ -73,9 +74,7 @@ impl<'a> Table<'a> {
         let entry = start.wrapping_add(2).wrapping_add(dictionary.wrapping_mul(4));
         let columns = crate::words::word(words, entry.wrapping_add(which));
         let table = start.wrapping_add(crate::words::word(words, entry.wrapping_add(2).wrapping_add(which)));
-        let file = if table < crate::words::DICTIONARY_START { words.file } else { words.dictionary };
-        let bytes = file.get(((table & 0x7fff_ffff) as usize).wrapping_mul(4)..).unwrap_or(&[]);
-        Table { bytes, row_bytes: (columns.wrapping_add(1) >> 1).wrapping_mul(4) as usize }
+        Table { bytes: bytes_from(words, table), row_bytes: (columns.wrapping_add(1) >> 1).wrapping_mul(4) as usize }
     }
 
     /// The rows of a table of means or scales at `start`: one for each view, an entry for each light.

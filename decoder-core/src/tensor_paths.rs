@@ -10,12 +10,13 @@ use crate::fixed::{clamp_magnitude, multiply_q15, round_shift};
 use crate::material::level_size;
 use crate::open::Selvedge;
 use crate::position::{Axis, axis_at_position};
-use crate::stream::window;
+use crate::records::bytes_from;
+use crate::stream::{Ones, window};
 use crate::tensor::{
     ANGULAR_BOUND, GROUP_TEXELS, LAYER_BOUND, blend_light, corner_weight, light_entry, list_bits, list_coefficient, list_low_bits, lists_start,
 };
 use crate::tensor_set::FIBRE_LIMIT;
-use crate::words::{DICTIONARY_START, Words, word};
+use crate::words::{low_part, word};
 
 /// Three channels side by side, and one that is not used.
 type Lanes = [i32; 4];
@@ -43,6 +44,8 @@ impl<'s> Room<'s> {
     }
 }
 
+/// Most quality layers (3.1-13).
+const LAYERS: usize = 8;
 /// Entries of a fibre that are weighed at once.
 const GROUP: usize = 8;
 
@@ -56,12 +59,6 @@ struct Atoms<'a> {
     fibres: &'a [[u8; 2]],
     entries: usize,
     index_mask: u16,
-}
-
-/// Bytes of the file that holds word `start`, from there on.
-fn bytes_from<'a>(words: Words<'a>, start: u32) -> &'a [u8] {
-    let file = if start < DICTIONARY_START { words.file } else { words.dictionary };
-    file.get(((start & 0x7fff_ffff) as usize).wrapping_mul(4)..).unwrap_or(&[])
 }
 
 impl<'a> Atoms<'a> {
@@ -177,17 +174,15 @@ struct Lists<'a> {
     atom_count: u32,
 }
 
-/// A list that is read from its begin.
-#[derive(Clone, Copy, Default)]
+/// The ABRDF atoms of a list and their coefficients, in order.
 struct Reader<'a> {
     stream: &'a [u8],
     left: u32,
     low_bits: u32,
     value_bits: u32,
     field_bit: u32,
-    /// Where the window of high parts begins, its ones, and the first bit of the high parts plus the ones taken.
-    base: u32,
-    ones: u64,
+    ones: Ones<'a>,
+    /// The first bit of the high parts, and the ones that were taken.
     taken: u32,
 }
 
@@ -223,34 +218,26 @@ impl<'a> Lists<'a> {
         let count = (counts & mask) as u32;
         let low_bits = list_low_bits(self.index_bits, count);
         let highs = bit.wrapping_add(count.wrapping_mul(low_bits.wrapping_add(self.value_bits)));
-        let ones = if count == 0 { 0 } else { window(self.stream, highs) & (u64::MAX >> 8) };
-        Reader { stream: self.stream, left: count, low_bits, value_bits: self.value_bits, field_bit: bit, base: highs, ones, taken: highs }
+        let end = bit.wrapping_add(list_bits(self.index_bits, self.value_bits, self.atom_count, count));
+        let ones = Ones::new(self.stream, highs, end);
+        Reader { stream: self.stream, left: count, low_bits, value_bits: self.value_bits, field_bit: bit, ones, taken: highs }
     }
 }
 
-impl Reader<'_> {
-    /// The next ABRDF atom and its coefficient; the end is above all atoms.
+impl Iterator for Reader<'_> {
+    type Item = (u32, i32);
+
     #[inline(always)]
-    fn next(&mut self) -> (u32, i32) {
-        if self.left == 0 {
-            return (u32::MAX, 0);
-        }
-        // A list has a bounded number of high bits (12.4-2), so this ends in a checked file; the bound is for others.
-        let mut steps = 0u32;
-        while self.ones == 0 && steps < 4 {
-            self.base = self.base.wrapping_add(56);
-            self.ones = window(self.stream, self.base) & (u64::MAX >> 8);
-            steps = steps.wrapping_add(1);
-        }
-        let high = self.base.wrapping_add(self.ones.trailing_zeros()).wrapping_sub(self.taken);
-        self.ones &= self.ones.wrapping_sub(1);
+    fn next(&mut self) -> Option<(u32, i32)> {
+        self.left = self.left.checked_sub(1)?;
+        let high = self.ones.take()?.wrapping_sub(self.taken);
         self.taken = self.taken.wrapping_add(1);
         let field = window(self.stream, self.field_bit) as u32;
         self.field_bit = self.field_bit.wrapping_add(self.low_bits).wrapping_add(self.value_bits);
-        self.left = self.left.wrapping_sub(1);
-        let low = field & (1u32 << (self.low_bits & 15)).wrapping_sub(1);
-        let value = (field >> (self.low_bits & 15)) & (1u32 << (self.value_bits & 15)).wrapping_sub(1);
-        ((high << (self.low_bits & 15)) | low, list_coefficient(value, self.value_bits & 15))
+        // Widths of a checked file are below sixteen; the masks are for others.
+        let (low_bits, value_bits) = (self.low_bits & 15, self.value_bits & 15);
+        let value = low_part(field >> low_bits, value_bits);
+        Some(((high << low_bits) | low_part(field, low_bits), list_coefficient(value, value_bits)))
     }
 }
 
@@ -303,9 +290,7 @@ impl<'a, 's> TensorSampler<'a, 's> {
                     if weight_x == 0 || weight_y == 0 {
                         continue;
                     }
-                    let mut reader = lists.list(row.wrapping_mul(material.width).wrapping_add(column));
-                    for _ in 0..reader.left {
-                        let (atom, coefficient) = reader.next();
+                    for (atom, coefficient) in lists.list(row.wrapping_mul(material.width).wrapping_add(column)) {
                         let atom = atom as usize & (WEIGHTS - 1);
                         used[atom >> 6] |= 1 << (atom & 63);
                         weights[atom] = weights[atom].wrapping_add(corner_weight(coefficient, weight_x, weight_y));
@@ -340,49 +325,37 @@ pub(crate) fn image_scratch_len(selvedge: &Selvedge<'_>) -> usize {
     count.wrapping_mul(4)
 }
 
-/// The textures of one channel for every texel of a level, row by row.
-pub(crate) fn image_textures(
-    selvedge: &Selvedge<'_>,
-    channel: usize,
-    level: u32,
-    light: Taps,
-    view: Taps,
-    scratch: &mut [i32],
-    mut put: impl FnMut(usize, i32),
-) {
+/// The textures of the three channels for every texel of a level, row by row.
+pub(crate) fn image_textures(selvedge: &Selvedge<'_>, level: u32, light: Taps, view: Taps, scratch: &mut [i32], mut put: impl FnMut(usize, [i32; 3])) {
     let material = selvedge.material();
     let atoms = Atoms::of(selvedge);
     let mut table = [[0i32; 4]; 256];
     atoms.blend_lights(light, &mut table);
     let values = scratch.as_chunks_mut::<4>().0;
     for (atom, slot) in (0..atoms.shifts.len() as u32).zip(values.iter_mut()) {
-        let (angular, gain_shift) = atoms.angular(atom, view, &table);
-        *slot = [angular[0], angular[1], angular[2], gain_shift as i32];
+        let ([c0, c1, c2, _], gain_shift) = atoms.angular(atom, view, &table);
+        *slot = [c0, c1, c2, gain_shift as i32];
     }
     let texels = level_size(material.width, level).wrapping_mul(level_size(material.height, level));
+    let mut layers = [const { None }; LAYERS];
+    for (layer, slot) in (0..material.layer_limit).zip(layers.iter_mut()) {
+        *slot = Some(Lists::of(selvedge, level, layer));
+    }
     for texel in 0..texels {
-        let mut texture = 0i32;
-        for layer in 0..material.layer_limit {
-            let lists = Lists::of(selvedge, level, layer);
-            let mut reader = lists.list(texel);
-            let mut total = 0i32;
-            loop {
-                let (atom, coefficient) = reader.next();
-                if atom == u32::MAX {
-                    break;
-                }
+        let mut textures = [0i32; 4];
+        for lists in layers.iter().flatten() {
+            let mut total = [0i32; 4];
+            for (atom, coefficient) in lists.list(texel) {
                 let Some(&[c0, c1, c2, gain_shift]) = values.get(atom as usize) else { break };
-                let angular = if channel == 0 {
-                    c0
-                } else if channel == 1 {
-                    c1
-                } else {
-                    c2
-                };
-                total = total.wrapping_add(round_shift(multiply_q15(coefficient << 15, angular), gain_shift as u32));
+                for (sum, angular) in total.iter_mut().zip([c0, c1, c2]) {
+                    *sum = sum.wrapping_add(round_shift(multiply_q15(coefficient << 15, angular), gain_shift as u32));
+                }
             }
-            texture = texture.wrapping_add(clamp_magnitude(round_shift(total, lists.shift), LAYER_BOUND));
+            for (texture, part) in textures.iter_mut().zip(to_q20(total, lists.shift)) {
+                *texture = texture.wrapping_add(part);
+            }
         }
-        put(texel as usize, texture);
+        let [t0, t1, t2, _] = textures;
+        put(texel as usize, [t0, t1, t2]);
     }
 }

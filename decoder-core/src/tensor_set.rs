@@ -6,9 +6,9 @@ use crate::directory::{FIBRES, LIGHT_ATOMS, LISTS, find_section};
 use crate::error::Rule;
 use crate::header::Header;
 use crate::material::{Material, level_size};
-use crate::stream::window;
+use crate::stream::{Ones, window};
 use crate::tensor::{GROUP_TEXELS, bit_length, list_bits, list_coefficient, list_low_bits};
-use crate::words::word;
+use crate::words::{low_part, word};
 
 /// Most light atoms (12.1-2).
 pub const LIGHT_ATOM_LIMIT: u32 = 256;
@@ -267,26 +267,19 @@ fn check_list(check: &mut Check<'_, '_>, stream: &Stream<'_>, bit: u32, count: u
     let low_bits = list_low_bits(stream.index_bits, count);
     let field_bits = low_bits + stream.value_bits;
     let highs = bit + count * field_bits;
+    let mut ones = Ones::new(stream.bytes, highs, bit + length);
     let (mut seen, mut next, mut sum, mut sound) = (0u32, 0u32, 0u32, true);
-    let mut base = highs;
-    while base < bit + length {
-        let most = (bit + length - base).min(32);
-        let mut ones = window(stream.bytes, base) & ((1u64 << most) - 1);
-        while ones != 0 {
-            let high = base + ones.trailing_zeros() - highs - seen.min(count);
-            ones &= ones - 1;
-            if seen < count {
-                let field = window(stream.bytes, bit + seen * field_bits) as u32;
-                let index = high << low_bits | field & ((1 << low_bits) - 1);
-                sound &= index >= next && index < atoms.count;
-                next = index + 1;
-                let coefficient = list_coefficient((field >> low_bits) & ((1 << stream.value_bits) - 1), stream.value_bits);
-                let gain_shift = (word(check.words, atoms.fibres_start + 2 + index.min(atoms.count - 1)) >> 5) & 31;
-                sum += coefficient.unsigned_abs().div_ceil(1 << gain_shift);
-            }
-            seen += 1;
+    while let Some(place) = ones.take() {
+        if seen < count {
+            let field = window(stream.bytes, bit + seen * field_bits) as u32;
+            let index = (place - highs - seen) << low_bits | low_part(field, low_bits);
+            sound &= index >= next && index < atoms.count;
+            next = index + 1;
+            let coefficient = list_coefficient(low_part(field >> low_bits, stream.value_bits), stream.value_bits);
+            let gain_shift = (word(check.words, atoms.fibres_start + 2 + index.min(atoms.count - 1)) >> 5) & 31;
+            sum += coefficient.unsigned_abs().div_ceil(1 << gain_shift);
         }
-        base += most;
+        seen += 1;
     }
     if check.ensure(sound && seen == count, Rule::ListIndices, at, bit) {
         check.ensure(sum <= LIST_SUM_LIMIT, Rule::ListSum, at, sum);
