@@ -20,34 +20,49 @@ use crate::words::{low_part, word};
 
 /// Three channels side by side, and one that is not used.
 type Lanes = [i32; 4];
-/// Light atoms at one light; as many as there can be, so that no index has to be checked.
-pub(crate) type LightTable = [Lanes; 256];
-
+/// Words of a [`LightTable`]: a place is below 1024 by its mask, and four words follow it, so that no place has to be checked.
+const TABLE_WORDS: usize = 1024 + 4;
+/// Light atoms at one light, three words each.
+type LightTable = [i32; TABLE_WORDS];
 /// As many weights as there can be ABRDF atoms.
 const WEIGHTS: usize = 1024;
+/// Most quality layers (3.1-13).
+const LAYERS: usize = 8;
+/// Entries of a fibre that are weighed at once.
+const GROUP: usize = 8;
+/// Entries of three fibres, and what a last group has behind them.
+const ENTRIES: usize = 3 * FIBRE_LIMIT as usize + GROUP;
+/// The place behind the last entry.
+const END: u16 = u16::MAX;
+
+/// The entries of an ABRDF atom's fibres at three views: how much of a light atom, and the word where its light begins.
+struct Entries {
+    weights: [i32; ENTRIES],
+    places: [u16; ENTRIES],
+}
+
+impl Entries {
+    const NONE: Entries = Entries { weights: [0; ENTRIES], places: [END; ENTRIES] };
+}
 
 /// What a sample works in. Weights are zero between samples.
 pub(crate) struct Room<'s> {
     table: &'s mut LightTable,
     weights: &'s mut [i32; WEIGHTS],
+    entries: Entries,
 }
 
 impl<'s> Room<'s> {
-    /// Words that it takes.
-    pub const WORDS: usize = size_of::<LightTable>() / 4 + WEIGHTS;
+    /// Words of scratch that it takes.
+    pub const WORDS: usize = TABLE_WORDS + WEIGHTS;
 
     /// Of scratch that is long enough.
     pub fn new(scratch: &'s mut [i32]) -> Option<Room<'s>> {
         scratch.fill(0);
-        let (table, rest) = scratch.split_at_mut_checked(size_of::<LightTable>() / 4)?;
-        Some(Room { table: table.as_chunks_mut::<4>().0.first_chunk_mut()?, weights: rest.first_chunk_mut()? })
+        let (table, rest) = scratch.split_at_mut_checked(TABLE_WORDS)?;
+        Some(Room { table: table.first_chunk_mut()?, weights: rest.first_chunk_mut()?, entries: Entries::NONE })
     }
 }
-
-/// Most quality layers (3.1-13).
-const LAYERS: usize = 8;
-/// Entries of a fibre that are weighed at once.
-const GROUP: usize = 8;
 
 /// The atoms of a material, as slices.
 struct Atoms<'a> {
@@ -84,45 +99,44 @@ impl<'a> Atoms<'a> {
             let start = (index as usize).wrapping_mul(self.light_atoms);
             self.lights.get(start..start.wrapping_add(self.light_atoms)).unwrap_or(&[])
         };
-        for (((slot, a), b), c) in table.iter_mut().zip(row(light.a)).zip(row(light.b)).zip(row(light.c)) {
+        for (((slot, a), b), c) in table.as_chunks_mut::<3>().0.iter_mut().zip(row(light.a)).zip(row(light.b)).zip(row(light.c)) {
             let (a, b, c) = (u32::from_le_bytes(*a), u32::from_le_bytes(*b), u32::from_le_bytes(*c));
-            *slot = [blend_light(a, b, c, light, 0), blend_light(a, b, c, light, 1), blend_light(a, b, c, light, 2), 0];
+            *slot = [blend_light(a, b, c, light, 0), blend_light(a, b, c, light, 1), blend_light(a, b, c, light, 2)];
         }
     }
 
     /// Words that [`Atoms::unpack_lights`] fills.
     fn unpacked_len(&self, light_count: u32) -> usize {
-        self.light_atoms.wrapping_mul(light_count as usize).wrapping_mul(4)
+        self.light_atoms.wrapping_mul(light_count as usize).wrapping_mul(3)
     }
 
-    /// Entries of light atoms as four words.
+    /// Entries of light atoms as three words.
     fn unpack_lights(&self, unpacked: &mut [i32]) {
-        for (slot, entry) in unpacked.as_chunks_mut::<4>().0.iter_mut().zip(self.lights) {
+        for (slot, entry) in unpacked.as_chunks_mut::<3>().0.iter_mut().zip(self.lights) {
             let entry = u32::from_le_bytes(*entry);
-            *slot = [light_entry(entry, 0), light_entry(entry, 1), light_entry(entry, 2), 0];
+            *slot = [light_entry(entry, 0), light_entry(entry, 1), light_entry(entry, 2)];
         }
     }
 
     /// [`Atoms::blend_lights`] from unpacked entries.
     #[inline(always)]
     fn blend_unpacked(&self, unpacked: &[i32], light: Taps, table: &mut LightTable) {
-        let length = self.light_atoms.wrapping_mul(4);
+        let length = self.light_atoms.wrapping_mul(3);
         let row = |index: u32| {
             let start = (index as usize).wrapping_mul(length);
             unpacked.get(start..start.wrapping_add(length)).unwrap_or(&[])
         };
-        for (((slot, a), b), c) in table.as_flattened_mut().iter_mut().zip(row(light.a)).zip(row(light.b)).zip(row(light.c)) {
+        for (((slot, a), b), c) in table.iter_mut().zip(row(light.a)).zip(row(light.b)).zip(row(light.c)) {
             let sum = a.wrapping_mul(light.weight_a_q15).wrapping_add(b.wrapping_mul(light.weight_b_q15));
             *slot = sum.wrapping_add(c.wrapping_mul(light.weight_c_q15)).wrapping_add(512) >> 10;
         }
     }
 
-    /// An ABRDF atom between three views (12.5-2, 12.5-3), and its gain's shift.
+    /// Gathers the entries of an ABRDF atom at three views, weighed (12.5-2), and gives the atom's shifts (12.2).
     #[inline(always)]
-    fn angular(&self, atom: u32, view: Taps, table: &LightTable) -> (Lanes, u32) {
-        // First all weights and places, eight side by side; what a group has behind its fibre is overwritten by the next, or not used.
-        let mut weights = [0i32; 3 * FIBRE_LIMIT as usize + GROUP];
-        let mut places = [0u16; 3 * FIBRE_LIMIT as usize + GROUP];
+    fn gather(&self, atom: u32, view: Taps, into: &mut Entries) -> u32 {
+        let Entries { weights, places } = into;
+        // A group at a time, side by side; what a group has behind its fibre is overwritten by the next, or lies behind the end.
         let mut filled = 0usize;
         for (view, weight) in [(view.a, view.weight_a_q15), (view.b, view.weight_b_q15), (view.c, view.weight_c_q15)] {
             let first = (view as usize).wrapping_mul(self.shifts.len()).wrapping_add(atom as usize).wrapping_mul(self.entries);
@@ -137,21 +151,50 @@ impl<'a> Atoms<'a> {
                 let slots = (weights.get_mut(at..).and_then(<[i32]>::first_chunk_mut), places.get_mut(at..).and_then(<[u16]>::first_chunk_mut));
                 if let (Some(weights), Some(places)) = slots {
                     *weights = group.map(|entry| ((entry & !self.index_mask) as i16 as i32).wrapping_mul(weight).wrapping_add(0x10000) >> 17);
-                    *places = group.map(|entry| entry & self.index_mask);
+                    *places = group.map(|entry| (entry & self.index_mask).wrapping_mul(3));
                 }
                 done = done.wrapping_add(GROUP);
             }
             filled = filled.wrapping_add(self.entries);
         }
-        let mut sums = [0i32; 4];
-        for (weight, place) in weights.iter().zip(&places).take(filled) {
-            let light = &table[(*place & 0xff) as usize];
-            for (sum, u) in sums.iter_mut().zip(light) {
-                *sum = sum.wrapping_add(weight.wrapping_mul(*u));
-            }
+        if let Some(end) = places.get_mut(filled) {
+            *end = END;
         }
-        let shifts = self.shifts.get(atom as usize).map_or(0, |bytes| u32::from_le_bytes(*bytes));
-        (sums.map(|sum| clamp_magnitude(round_shift(sum, shifts & 31), ANGULAR_BOUND)), (shifts >> 5) & 31)
+        self.shifts.get(atom as usize).map_or(0, |bytes| u32::from_le_bytes(*bytes))
+    }
+}
+
+/// [`round_shift`] of four lanes, without a branch, so that they stay one vector.
+#[inline(always)]
+fn round_lanes(lanes: Lanes, shift: u32) -> Lanes {
+    let (below, bit) = (shift.saturating_sub(1), (shift != 0) as i32);
+    lanes.map(|lane| (lane >> shift).wrapping_add((lane >> below) & bit))
+}
+
+/// An ABRDF atom between three views and lights (12.5-2, 12.5-3), from its gathered entries.
+// A loop that ends by what it finds is not turned on its side by the compiler, where a counted one becomes lanes of entries instead of channels.
+#[inline(always)]
+fn angular(entries: &Entries, table: &LightTable, shift: u32) -> Lanes {
+    let mut sums = [0i32; 4];
+    for (weight, place) in entries.weights.iter().zip(&entries.places) {
+        if *place == END {
+            break;
+        }
+        let Some(light) = table.get((*place & 0x3ff) as usize..).and_then(<[i32]>::first_chunk::<4>) else { break };
+        for (sum, u) in sums.iter_mut().zip(light) {
+            *sum = sum.wrapping_add(weight.wrapping_mul(*u));
+        }
+    }
+    round_lanes(sums, shift).map(|sum| clamp_magnitude(sum, ANGULAR_BOUND))
+}
+
+/// Adds an ABRDF atom to the sums of a layer (12.5-5).
+// Apart, and into memory: what a caller does with single channels would split the vector.
+#[inline(never)]
+fn add_atom(entries: &Entries, table: &LightTable, shifts: u32, weight: i32, total: &mut Lanes) {
+    let parts = angular(entries, table, shifts & 31).map(|angular| multiply_q15(weight, angular));
+    for (sum, part) in total.iter_mut().zip(round_lanes(parts, (shifts >> 5) & 31)) {
+        *sum = sum.wrapping_add(part);
     }
 }
 
@@ -275,7 +318,7 @@ impl<'a, 's> TensorSampler<'a, 's> {
 
     /// [`crate::tensor::textures_q20`] at level 0, the same bits.
     pub fn textures(&self, selvedge: &Selvedge<'a>, u_q32: u32, v_q32: u32, light: Taps, view: Taps, room: &mut Room<'_>) -> Values {
-        let Room { table, weights } = room;
+        let Room { table, weights, entries } = room;
         let material = selvedge.material();
         let axis = |size: u32, position: u32| two_texels(axis_at_position(material.edge, material.edge_reciprocal_q18, size, position));
         let (x, y) = (axis(material.width, u_q32), axis(material.height, v_q32));
@@ -304,18 +347,15 @@ impl<'a, 's> TensorSampler<'a, 's> {
                     let atom = word << 6 | bits.trailing_zeros() as usize;
                     bits &= bits.wrapping_sub(1);
                     let weight = core::mem::take(&mut weights[atom & (WEIGHTS - 1)]);
-                    let (angular, gain_shift) = self.atoms.angular(atom as u32, view, table);
-                    for (sum, angular) in total.iter_mut().zip(angular) {
-                        *sum = sum.wrapping_add(round_shift(multiply_q15(weight, angular), gain_shift));
-                    }
+                    let shifts = self.atoms.gather(atom as u32, view, entries);
+                    add_atom(entries, table, shifts, weight, &mut total);
                 }
             }
             for (sum, part) in sums.iter_mut().zip(to_q20(total, lists.shift)) {
                 *sum = sum.wrapping_add(part);
             }
         }
-        // The fourth lane is zero, which only the table knows: added here, it keeps all four in one vector.
-        Values { c0: sums[0].wrapping_add(sums[3]), c1: sums[1], c2: sums[2] }
+        Values { c0: sums[0], c1: sums[1], c2: sums[2] }
     }
 }
 
@@ -329,12 +369,14 @@ pub(crate) fn image_scratch_len(selvedge: &Selvedge<'_>) -> usize {
 pub(crate) fn image_textures(selvedge: &Selvedge<'_>, level: u32, light: Taps, view: Taps, scratch: &mut [i32], mut put: impl FnMut(usize, [i32; 3])) {
     let material = selvedge.material();
     let atoms = Atoms::of(selvedge);
-    let mut table = [[0i32; 4]; 256];
+    let mut table = [0; TABLE_WORDS];
     atoms.blend_lights(light, &mut table);
     let values = scratch.as_chunks_mut::<4>().0;
+    let mut entries = Entries::NONE;
     for (atom, slot) in (0..atoms.shifts.len() as u32).zip(values.iter_mut()) {
-        let ([c0, c1, c2, _], gain_shift) = atoms.angular(atom, view, &table);
-        *slot = [c0, c1, c2, gain_shift as i32];
+        let shifts = atoms.gather(atom, view, &mut entries);
+        let [c0, c1, c2, _] = angular(&entries, &table, shifts & 31);
+        *slot = [c0, c1, c2, ((shifts >> 5) & 31) as i32];
     }
     let texels = level_size(material.width, level).wrapping_mul(level_size(material.height, level));
     let mut layers = [const { None }; LAYERS];
