@@ -22,6 +22,12 @@ use std::time::Instant;
 const RUNS: usize = 9;
 const QUERIES: usize = 1 << 14;
 
+/// Fused where the processor fuses.
+#[inline(always)]
+fn multiply_add(a: f32, b: f32, c: f32) -> f32 {
+    if cfg!(target_feature = "fma") { a.mul_add(b, c) } else { a * b + c }
+}
+
 /// The tensor in binary32.
 struct Floats {
     width: u32,
@@ -76,9 +82,9 @@ impl Floats {
             let mut angular = [0.0f32; 4];
             for &(index, value) in fibre {
                 let l = lights[index as usize];
-                (0..4).for_each(|c| angular[c] += value * l[c]);
+                (0..4).for_each(|c| angular[c] = multiply_add(value, l[c], angular[c]));
             }
-            (0..4).for_each(|c| sum[c] += coefficient * angular[c]);
+            (0..4).for_each(|c| sum[c] = multiply_add(coefficient, angular[c], sum[c]));
         }
         sum
     }

@@ -19,6 +19,7 @@
 //! | [`inspect`], [`explain`](mod@explain), [`picture`], [`demo`] | what `info`, `explain`, `decode` and `demo` show |
 //! | [`kernel`], [`gpu`] | the kernel for other renderers, and run here |
 //! | [`example`], [`extreme`], [`random`] | files that the specification and the tests use |
+//! | [`count`] | the price of a sample, walked |
 //! | [`vectors`], [`conform`] | the conformance suite, made of recipes; decoders held against it |
 //! | [`baseline`] | what the encoder is measured against |
 //! | [`cli`] | the program |
@@ -30,6 +31,7 @@ pub mod blend;
 pub mod blocks;
 pub mod cli;
 pub mod conform;
+pub mod count;
 pub mod dataset;
 pub mod demo;
 pub mod dictionary;
@@ -56,6 +58,7 @@ pub mod quantise;
 pub mod random;
 pub mod read;
 pub mod sector;
+pub mod similarity;
 pub mod sparsebtf;
 pub mod story;
 pub mod synth;

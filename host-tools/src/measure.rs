@@ -3,6 +3,7 @@
 //! Errors are of linear radiance and of `ln(x + e)`, where `e` is one thousandth of the reference's mean, the same for
 //! everything that is compared with that reference. Files are decoded by the core, at the directions of the reference.
 
+use crate::baseline::decoder::{Blend, Decoder, Locator};
 use crate::dataset::{Dataset, Description, Statistics};
 use crate::error::{Result, ToolError};
 use crate::linear::ordered;
@@ -22,6 +23,8 @@ pub enum Source<'a> {
     Data(&'a Dataset),
     /// A file, decoded by the core at a level of detail.
     File(&'a Selvedge<'a>, u32),
+    /// A baseline, and what finds its directions.
+    Baseline(&'a dyn Decoder, &'a Locator<'a>),
 }
 
 /// Largest difference and where it is.
@@ -154,6 +157,10 @@ fn images(source: Source<'_>, description: &Description, view: usize, lights: St
                 out[i * texels..][..texels].iter_mut().zip(&image).for_each(|(out, rgb)| *out = rgb.to_f32());
             }
         }
+        Source::Baseline(decoder, locator) => {
+            let lights: Vec<Blend> = numbers.into_iter().map(|light| locator.light(query(description.lights[light]), decoder.two_nearest())).collect();
+            decoder.images(&lights, locator.view(query(description.views[view]), decoder.two_nearest()), out);
+        }
     }
     Ok(())
 }
@@ -195,6 +202,7 @@ pub fn compare_every(
                 own.size
             }
             Source::File(file, level) => file.image_size(level).map(|n| n as usize),
+            Source::Baseline(_, locator) => locator.size,
         };
         if size != description.size {
             let [a, b] = [size, description.size].map(|[x, y]| format!("{x} x {y}"));

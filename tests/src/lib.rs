@@ -1,6 +1,5 @@
-//! What several tests share: where the data are, loud words for what is skipped, the bodies of the fuzz targets, and a count of costs.
+//! What several tests share: where the data are, loud words for what is skipped, and the bodies of the fuzz targets.
 
-pub mod cost;
 pub mod targets;
 
 use std::path::{Path, PathBuf};

@@ -2,9 +2,9 @@
 //!
 //! The targets of `fuzz/` call them under libFuzzer, `soak` calls them without it, and the ordinary tests replay seeds and regressions.
 
-use crate::cost;
 use selvedge::batch::FilteredQuery;
 use selvedge::{Direction, Finding, First, Limits, Part, Rgb, Selvedge};
+use selvedge_tools::count;
 use selvedge_tools::extreme::{Reach, extreme_model_from, extreme_tensor_from};
 use selvedge_tools::random::Random;
 use selvedge_tools::read::{model_of, same_triangles};
@@ -113,7 +113,7 @@ fn sample_all_paths(material: &Selvedge<'_>, seed: u64) {
     for (query, rgb) in queries.iter().zip(&out) {
         assert_eq!(material.filtered(query.u_q32, query.v_q32, query.light, query.view), *rgb, "{query:?}");
         let level = random.word() % header.level_count;
-        let counted = cost::filtered(material, level, query.u_q32, query.v_q32, query.light, query.view);
+        let counted = count::filtered(material, level, query.u_q32, query.v_q32, query.light, query.view);
         assert!(counted.operations <= header.operations as u64, "{} operations where {} are stated", counted.operations, header.operations);
         let (light, view) = (material.locate_light(query.light), material.locate_view(query.view));
         let values = selvedge::interpolation::filtered_values(material.words(), material.material(), level, query.u_q32, query.v_q32, light, view);

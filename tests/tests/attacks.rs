@@ -3,7 +3,7 @@
 //! Memory is no matter of the core, which has none (`firmware/` links it without an allocator). Work is counted, not timed.
 
 use selvedge::{Direction, Limits, Rule, Selvedge};
-use selvedge_tests::cost;
+use selvedge_tools::count;
 use selvedge_tools::example::example_model;
 use selvedge_tools::model::{ChannelModel, MaterialModel, PairTableModel};
 use selvedge_tools::random::Random;
@@ -29,7 +29,7 @@ fn dearest(material: &Selvedge<'_>) -> u64 {
         };
         let (light, view) = (direction(), direction());
         let level = random.word() % material.header().level_count;
-        most = most.max(cost::filtered(material, level, random.word(), random.word(), light, view).operations);
+        most = most.max(count::filtered(material, level, random.word(), random.word(), light, view).operations);
     }
     assert!(most <= material.header().operations as u64);
     most

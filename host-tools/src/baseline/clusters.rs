@@ -6,7 +6,8 @@
 //! or 16 bits with a scale for each component of a cluster, and everything is counted.
 
 use super::Row;
-use super::pca::{Pca, decode_and_compare, quantised};
+use super::decoder::{At, Blend, Decoder, add_row};
+use super::pca::{Domain, Pca, decode_and_compare, quantised};
 use crate::error::Result;
 use crate::linear::{eigenbasis, product_bt};
 use crate::random::Random;
@@ -93,18 +94,8 @@ impl Clusters<'_, '_> {
         clusters * ((components + 1) * columns * width + 8 + 8 * components) + number.div_ceil(8) + texels * components * width
     }
 
-    /// Multiplications of a filtered sample: components are interpolated between nine pairs and three colours once for each cluster that its four
-    /// texels are of (at most four), then each texel adds its coefficients, blended by four weights.
-    pub fn operations(&self) -> u64 {
-        let n = self.components as u64 + 1;
-        4 * (n * 27 + 3 * n) + 12
-    }
-
-    /// Errors over all values, decoded from quantised factors.
-    ///
-    /// # Errors
-    /// If the data cannot be read.
-    pub fn measure(&self, bits: u32) -> Result<Row> {
+    /// Decodes what a width would store.
+    pub fn decoder(&self, bits: u32) -> Decoded {
         let (rank, n) = (self.pca.rank(), self.components);
         let columns = self.pca.mean.len();
         // Each cluster's mean and components in the space of the data.
@@ -134,15 +125,131 @@ impl Clusters<'_, '_> {
             let rounded = quantised(&of_cluster, n.max(1), n, bits);
             members.iter().zip(rounded.chunks(n.max(1))).for_each(|(&i, row)| coefficients[i * n..][..n].copy_from_slice(row));
         }
+        let description = self.pca.dataset.description();
+        Decoded {
+            rows,
+            coefficients,
+            assigned: self.assigned.clone(),
+            clusters: self.clusters,
+            components: n,
+            columns,
+            domain: self.pca.domain,
+            offset: self.pca.dataset.statistics().log_offset(),
+            width: description.size[0],
+            lights: description.lights.len(),
+            bytes: self.bytes(bits),
+        }
+    }
+
+    /// Errors over all values, decoded from quantised factors.
+    ///
+    /// # Errors
+    /// If the data cannot be read.
+    pub fn measure(&self, bits: u32) -> Result<Row> {
+        let decoded = self.decoder(bits);
+        let (columns, n) = (decoded.columns, decoded.components);
         let decode = |texel: usize, out: &mut [f32]| {
-            let rows = &rows[self.assigned[texel] * (n + 1) * columns..][..(n + 1) * columns];
+            let rows = &decoded.rows[self.assigned[texel] * (n + 1) * columns..][..(n + 1) * columns];
             out.copy_from_slice(&rows[..columns]);
             for (c, row) in rows[columns..].chunks(columns).enumerate() {
-                let coefficient = coefficients[texel * n + c];
-                out.iter_mut().zip(row).for_each(|(o, r)| *o += coefficient * r);
+                add_row(out, decoded.coefficients[texel * n + c], row);
             }
         };
         decode_and_compare(self.pca, self.bytes(bits), &decode)
+    }
+}
+
+/// Clusters decoded from what they store.
+pub struct Decoded {
+    /// `[cluster][mean and components][pair and colour]`.
+    rows: Vec<f32>,
+    /// `[texel][component]`.
+    coefficients: Vec<f32>,
+    assigned: Vec<usize>,
+    clusters: usize,
+    components: usize,
+    columns: usize,
+    domain: Domain,
+    offset: f32,
+    width: usize,
+    lights: usize,
+    bytes: u64,
+}
+
+impl Decoded {
+    /// Mean and components of a cluster at one pair.
+    #[inline(always)]
+    fn row(&self, cluster: usize, row: usize, pair: usize) -> [f32; 3] {
+        let start = (cluster * (self.components + 1) + row) * self.columns + pair * 3;
+        std::array::from_fn(|c| self.rows[start + c])
+    }
+
+    /// The texels of a sample, each with its weights of mean and components; those of one cluster are put together.
+    #[inline(always)]
+    fn gathered(&self, at: &At) -> ([(usize, f32); 4], usize) {
+        let mut clusters = [(usize::MAX, 0.0); 4];
+        let mut count = 0;
+        for (texel, weight) in at.texels(self.width) {
+            let cluster = self.assigned[texel];
+            match clusters[..count].iter_mut().find(|c| c.0 == cluster) {
+                Some(known) => known.1 += weight,
+                None => {
+                    clusters[count] = (cluster, weight);
+                    count += 1;
+                }
+            }
+        }
+        (clusters, count)
+    }
+}
+
+impl Decoder for Decoded {
+    fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    fn images(&self, lights: &[Blend], view: Blend, out: &mut [[f32; 3]]) {
+        let (texels, n) = (out.len() / lights.len(), self.components);
+        let mut blended = vec![[0.0f32; 3]; self.clusters * (n + 1)];
+        for (&light, out) in lights.iter().zip(out.chunks_mut(texels)) {
+            let at = At { x: [(0, 1.0); 2], y: [(0, 1.0); 2], light, view };
+            let pairs = at.pairs(self.lights);
+            for (i, sum) in blended.iter_mut().enumerate() {
+                *sum = [0.0; 3];
+                pairs.iter().for_each(|&(pair, weight)| add_row(sum, weight, &self.row(i / (n + 1), i % (n + 1), pair)));
+            }
+            for (texel, rgb) in out.iter_mut().enumerate() {
+                let rows = &blended[self.assigned[texel] * (n + 1)..][..n + 1];
+                let mut sum = rows[0];
+                rows[1..].iter().zip(&self.coefficients[texel * n..]).for_each(|(row, &weight)| add_row(&mut sum, weight, row));
+                *rgb = sum.map(|y| self.domain.back(y, self.offset));
+            }
+        }
+    }
+
+    fn filtered(&self, at: &At) -> [f32; 3] {
+        let n = self.components;
+        let (clusters, count) = self.gathered(at);
+        let (pairs, texels) = (at.pairs(self.lights), at.texels(self.width));
+        let mut sum = [0.0f32; 3];
+        for &(cluster, of_mean) in &clusters[..count] {
+            for row in 0..=n {
+                let weight = if row == 0 {
+                    of_mean
+                } else {
+                    let of =
+                        |(texel, weight): (usize, f32)| if self.assigned[texel] == cluster { weight * self.coefficients[texel * n + row - 1] } else { 0.0 };
+                    texels.into_iter().map(of).sum()
+                };
+                pairs.iter().for_each(|&(pair, share)| add_row(&mut sum, weight * share, &self.row(cluster, row, pair)));
+            }
+        }
+        sum.map(|y| self.domain.back(y, self.offset))
+    }
+
+    fn operations(&self, at: &At) -> u64 {
+        let (pairs, n, clusters) = (at.pairs(self.lights).len() as u64, self.components as u64, self.gathered(at).1 as u64);
+        4 * n + clusters * (n + 1) * pairs * 4 + self.domain.operations()
     }
 }
 

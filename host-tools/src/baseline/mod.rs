@@ -1,12 +1,14 @@
 //! What the encoder is measured against: older ways to store the same data, in honest floats.
 //!
 //! [`pca`] is a truncated singular value decomposition, quantised to 8 or 16 bits; [`clusters`] has one for each cluster of
-//! texels; [`tucker`] is the decomposition along all modes. [`published`] is the
+//! texels; [`tucker`] is the decomposition along all modes; [`data`] are the data themselves. [`published`] is the
 //! layout of SparseBTF (Kavoosighafi et al. 2023, sections 3.1 to 3.4). All are decoded from what they would store, and
 //! compared by the metrics of [`crate::measure`]: root mean squared errors of linear radiance and of `ln(x + e)` over all
 //! values, where `e` is the dataset's [`log_offset`](crate::dataset::Statistics::log_offset). Neither writes a file.
 
 pub mod clusters;
+pub mod data;
+pub mod decoder;
 pub mod pca;
 pub mod published;
 pub mod tucker;

@@ -5,6 +5,7 @@
 //! so that the matrix is never held. Both factors and the mean are quantised to 8 or 16 bits, a scale for each component
 //! and factor, and everything is counted. Singular values are in the factor over texels.
 
+use super::decoder::{At, Blend, Decoder, EXPONENTIAL, add_row, dot};
 use super::{Row, Sums};
 use crate::dataset::Dataset;
 use crate::error::Result;
@@ -38,6 +39,11 @@ impl Domain {
     #[inline(always)]
     pub fn forward(self, x: f32, offset: f32) -> f32 {
         if self == Domain::Log { LN_2 * log2(x + offset) } else { x }
+    }
+
+    /// Multiplications of [`Domain::back`] for three channels.
+    pub fn operations(self) -> u64 {
+        if self == Domain::Log { 3 * EXPONENTIAL } else { 0 }
     }
 
     /// Radiance again.
@@ -76,6 +82,77 @@ pub struct Choice {
     pub bits: u32,
     /// Cost and errors.
     pub row: Row,
+}
+
+/// Components decoded from what they store.
+pub struct Decoded {
+    mean: Vec<f32>,
+    of_texels: Vec<f32>,
+    of_pairs: Vec<f32>,
+    rank: usize,
+    domain: Domain,
+    offset: f32,
+    width: usize,
+    lights: usize,
+    bytes: u64,
+}
+
+impl Decoder for Decoded {
+    fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    fn images(&self, lights: &[Blend], view: Blend, out: &mut [[f32; 3]]) {
+        let (rank, texels) = (self.rank, out.len() / lights.len());
+        let mut rows = vec![0.0f32; lights.len() * 3 * rank];
+        let mut values = vec![0.0f32; lights.len() * 3 * texels];
+        for (i, &light) in lights.iter().enumerate() {
+            let at = At { x: [(0, 1.0); 2], y: [(0, 1.0); 2], light, view };
+            for &(pair, weight) in at.pairs(self.lights).iter() {
+                add_row(&mut rows[i * 3 * rank..][..3 * rank], weight, &self.of_pairs[pair * 3 * rank..][..3 * rank]);
+                for c in 0..3 {
+                    let mean = weight * self.mean[pair * 3 + c];
+                    values[(i * 3 + c) * texels..][..texels].iter_mut().for_each(|v| *v += mean);
+                }
+            }
+        }
+        if rank > 0 {
+            product_bt(&mut values, &rows, &self.of_texels, [lights.len() * 3, rank, texels], true);
+        }
+        for (i, rgb) in out.iter_mut().enumerate() {
+            *rgb = std::array::from_fn(|c| self.domain.back(values[(i / texels * 3 + c) * texels + i % texels], self.offset));
+        }
+    }
+
+    fn filtered(&self, at: &At) -> [f32; 3] {
+        // The four texels' weights first, so that every pair and colour meets one row of them.
+        const MOST: usize = 512;
+        let mut blended = [0.0f32; MOST];
+        let mut sum = [0.0f32; 3];
+        let texels = at.texels(self.width);
+        for &(pair, weight) in at.pairs(self.lights).iter() {
+            (0..3).for_each(|c| sum[c] += weight * self.mean[pair * 3 + c]);
+        }
+        let mut first = 0;
+        while first < self.rank {
+            let part = (self.rank - first).min(MOST);
+            let blended = &mut blended[..part];
+            blended.fill(0.0);
+            texels.iter().for_each(|&(texel, weight)| add_row(blended, weight, &self.of_texels[texel * self.rank + first..][..part]));
+            for &(pair, weight) in at.pairs(self.lights).iter() {
+                for (c, sum) in sum.iter_mut().enumerate() {
+                    *sum += weight * dot(blended, &self.of_pairs[(pair * 3 + c) * self.rank + first..][..part]);
+                }
+            }
+            first += part;
+        }
+        sum.map(|y| self.domain.back(y, self.offset))
+    }
+
+    fn operations(&self, at: &At) -> u64 {
+        let (pairs, rank) = (at.pairs(self.lights).len() as u64, self.rank as u64);
+        4 * rank + pairs * (3 * rank + 6) + self.domain.operations()
+    }
 }
 
 thread_local! {
@@ -226,14 +303,8 @@ impl Pca<'_> {
         if let Some(row) = self.measured.get(&(rank, bits)) {
             return Ok(*row);
         }
-        let offset = self.dataset.statistics().log_offset();
         let columns = self.mean.len();
-        let of_texels = quantised(&self.of_texels, self.rank, rank, bits);
-        let of_pairs = quantised(&self.of_pairs, self.rank, rank, bits);
-        let least = self.mean.iter().copied().fold(f32::MAX, f32::min);
-        let largest = self.mean.iter().copied().fold(f32::MIN, f32::max);
-        let scale = (largest - least).max(1e-30) / ((1u32 << bits) - 1) as f32;
-        let mean: Vec<f32> = self.mean.iter().map(|m| least + ((m - least) / scale).round() * scale).collect();
+        let Decoded { mean, of_texels, of_pairs, offset, .. } = self.decoder(rank, bits);
         let work = |first: usize, values: &[f32]| {
             LOGS.with_borrow_mut(|logs| {
                 logs.resize(values.len(), 0.0);
@@ -251,6 +322,26 @@ impl Pca<'_> {
         let row = sums.row(self.bytes(rank, bits));
         self.measured.insert((rank, bits), row);
         Ok(row)
+    }
+
+    /// Decodes what a rank and width would store.
+    pub fn decoder(&self, rank: usize, bits: u32) -> Decoded {
+        let rank = rank.min(self.rank);
+        let least = self.mean.iter().copied().fold(f32::MAX, f32::min);
+        let largest = self.mean.iter().copied().fold(f32::MIN, f32::max);
+        let scale = (largest - least).max(1e-30) / ((1u32 << bits) - 1) as f32;
+        let description = self.dataset.description();
+        Decoded {
+            mean: self.mean.iter().map(|m| least + ((m - least) / scale).round() * scale).collect(),
+            of_texels: quantised(&self.of_texels, self.rank, rank, bits),
+            of_pairs: quantised(&self.of_pairs, self.rank, rank, bits),
+            rank,
+            domain: self.domain,
+            offset: self.dataset.statistics().log_offset(),
+            width: description.size[0],
+            lights: description.lights.len(),
+            bytes: self.bytes(rank, bits),
+        }
     }
 
     fn error_at(&mut self, rank: usize, bits: u32) -> Result<f64> {

@@ -7,6 +7,7 @@
 //! dictionary a channel), although the published ones were trained on other materials. Ensembles are an argument, and their
 //! bytes are told apart.
 
+use super::decoder::{At, Blend, Decoder, EXPONENTIAL, add_row};
 use super::{Row, Sums};
 use crate::dataset::Dataset;
 use crate::dictionary::{self, Ensemble, Turn};
@@ -303,6 +304,42 @@ impl Layout<'_> {
         Ok(row)
     }
 
+    /// Decodes what so many coefficients of each block would store.
+    pub fn decoder(&self, coefficients: usize) -> Decoded {
+        let coefficients = coefficients.min(self.most);
+        let sparsity = Published::sparsity(coefficients);
+        let description = self.published.dataset.description();
+        let mut terms = Vec::new();
+        let mut ends = Vec::new();
+        for lists in &self.lists {
+            for c in 0..3 {
+                let kept = |k: usize| &lists[c][k][..sparsity[c].min(lists[c][k].len())];
+                let energy = |k: usize| kept(k).iter().map(|v| (v.1 as f64).powi(2)).sum::<f64>();
+                let k = (1..lists[c].len()).fold(0, |best, k| if energy(k) > energy(best) { k } else { best });
+                let (cl, cv) = (self.ensembles[c].light.columns as u32, self.ensembles[c].view.columns as u32);
+                terms.extend(kept(k).iter().map(|&(place, value)| Term {
+                    value: f16::from_f32(value).to_f32(),
+                    light: (place % cl) as u16,
+                    view: (place / cl % cv) as u16,
+                    x: (place / (cl * cv) % EDGE as u32) as u8,
+                    y: (place / (cl * cv) / EDGE as u32) as u8,
+                    dictionary: k as u16,
+                }));
+                ends.push(terms.len());
+            }
+        }
+        Decoded {
+            terms,
+            ends,
+            bases: self.ensembles.each_ref().map(|e| (0..e.turns.len()).map(|k| (e.angular(k), e.turns[k].x.clone(), e.turns[k].y.clone())).collect()),
+            means: self.published.means.clone(),
+            deviations: self.published.deviations.clone(),
+            size: description.size,
+            lights: description.lights.len(),
+            bytes: self.published.bytes(coefficients),
+        }
+    }
+
     /// Coefficients of a block within a budget, and what they reach; `None` if not even the tables fit.
     ///
     /// # Errors
@@ -346,6 +383,145 @@ impl Layout<'_> {
         }
         Ok(Some((high, self.measure(high)?)))
     }
+}
+
+/// A coefficient and its place.
+#[derive(Clone, Copy)]
+struct Term {
+    value: f32,
+    light: u16,
+    view: u16,
+    x: u8,
+    y: u8,
+    dictionary: u16,
+}
+
+/// The layout decoded from what it stores.
+pub struct Decoded {
+    /// Terms of all blocks, three channels each, largest first.
+    terms: Vec<Term>,
+    /// Where the terms of a block's channel end.
+    ends: Vec<usize>,
+    /// Of each channel's dictionaries: bases of lights and views, of x, of y.
+    bases: [Vec<([Basis; 2], Basis, Basis)>; 3],
+    means: Vec<f32>,
+    deviations: Vec<f32>,
+    size: [usize; 2],
+    lights: usize,
+    bytes: u64,
+}
+
+impl Decoded {
+    fn terms(&self, block: usize, channel: usize) -> &[Term] {
+        let i = block * 3 + channel;
+        &self.terms[if i == 0 { 0 } else { self.ends[i - 1] }..self.ends[i]]
+    }
+
+    /// The angular factor of a term between directions: the columns of each pair times its standard deviation, as the published shader has it.
+    #[inline(always)]
+    fn angular(&self, channel: usize, term: &Term, light: Blend, view: Blend) -> f32 {
+        let [of_lights, of_views] = &self.bases[channel][term.dictionary as usize].0;
+        let mut sum = 0.0;
+        for (v, weight_v) in view.parts() {
+            let mut inner = 0.0;
+            for (l, weight_l) in light.parts() {
+                inner += weight_l * of_lights.at(l, term.light as usize) * self.deviations[v * self.lights + l];
+            }
+            sum += weight_v * of_views.at(v, term.view as usize) * inner;
+        }
+        term.value * sum
+    }
+
+    fn mean(&self, at: &At) -> f32 {
+        at.pairs(self.lights).iter().map(|&(pair, weight)| weight * self.means[pair]).sum()
+    }
+
+    fn back(yuv: [f32; 3]) -> [f32; 3] {
+        YUV_TO_RGB.map(|row| (row_times(&row.map(|m| m as f32), yuv).exp() - LOG_OFFSET).max(0.0))
+    }
+}
+
+impl Decoder for Decoded {
+    fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    fn images(&self, lights: &[Blend], view: Blend, out: &mut [[f32; 3]]) {
+        let [width, height] = self.size;
+        let across = width.div_ceil(EDGE);
+        for (&light, out) in lights.iter().zip(out.chunks_mut(width * height)) {
+            let mean = self.mean(&At { x: [(0, 1.0); 2], y: [(0, 1.0); 2], light, view });
+            for block in 0..self.ends.len() / 3 {
+                let (left, top) = (block % across * EDGE, block / across * EDGE);
+                let mut planes = [[mean; EDGE * EDGE]; 3];
+                for (c, plane) in planes.iter_mut().enumerate() {
+                    let terms = self.terms(block, c);
+                    let Some(first) = terms.first() else { continue };
+                    let (_, x_basis, y_basis) = &self.bases[c][first.dictionary as usize];
+                    let (mut core, mut rows) = ([0.0f32; EDGE * EDGE], [0.0f32; EDGE * EDGE]);
+                    terms.iter().for_each(|term| core[term.y as usize * EDGE + term.x as usize] += self.angular(c, term, light, view));
+                    for (y, row) in rows.chunks_mut(EDGE).enumerate() {
+                        (0..EDGE).for_each(|k| add_row(row, y_basis.at(y, k), &core[k * EDGE..][..EDGE]));
+                    }
+                    for (row, out) in rows.chunks(EDGE).zip(plane.chunks_mut(EDGE)) {
+                        out.iter_mut().enumerate().for_each(|(x, out)| *out += (0..EDGE).map(|k| x_basis.at(x, k) * row[k]).sum::<f32>());
+                    }
+                }
+                for y in top..height.min(top + EDGE) {
+                    for x in left..width.min(left + EDGE) {
+                        let i = (y - top) * EDGE + x - left;
+                        out[y * width + x] = Decoded::back(planes.each_ref().map(|plane| plane[i]));
+                    }
+                }
+            }
+        }
+    }
+
+    fn filtered(&self, at: &At) -> [f32; 3] {
+        let across = self.size[0].div_ceil(EDGE);
+        let mut yuv = [self.mean(at); 3];
+        // Blocks between which the sample is, each with the blended rows of its texels.
+        for (block_y, part_y) in parts_of(at.y) {
+            for (block_x, part_x) in parts_of(at.x) {
+                for (c, value) in yuv.iter_mut().enumerate() {
+                    for term in self.terms(block_y * across + block_x, c) {
+                        let (_, x_basis, y_basis) = &self.bases[c][term.dictionary as usize];
+                        let of = |basis: &Basis, part: [(usize, f32); 2], column: u8| -> f32 {
+                            part.iter().map(|&(row, weight)| weight * basis.at(row, column as usize)).sum()
+                        };
+                        *value += self.angular(c, term, at.light, at.view) * of(x_basis, part_x, term.x) * of(y_basis, part_y, term.y);
+                    }
+                }
+            }
+        }
+        Decoded::back(yuv)
+    }
+
+    fn operations(&self, at: &At) -> u64 {
+        let across = self.size[0].div_ceil(EDGE);
+        let (views, lights) = (at.view.parts().count() as u64, at.light.parts().count() as u64);
+        let mut terms = 0;
+        for (block_y, _) in parts_of(at.y) {
+            for (block_x, _) in parts_of(at.x) {
+                terms += (0..3).map(|c| self.terms(block_y * across + block_x, c).len() as u64).sum::<u64>();
+            }
+        }
+        // A term: two products for each pair of directions and one for a view, its value, two rows of two texels, and both.
+        terms * (views * (2 * lights + 2) + 1 + 4 + 2) + 2 * views * lights + 9 + 3 * EXPONENTIAL
+    }
+
+    fn two_nearest(&self) -> bool {
+        true
+    }
+}
+
+/// The blocks that two texels of an axis are of, and their rows and weights within.
+fn parts_of(axis: [(usize, f32); 2]) -> impl Iterator<Item = (usize, [(usize, f32); 2])> {
+    let [(a, weight_a), (b, weight_b)] = axis;
+    let same = a / EDGE == b / EDGE;
+    let first = (a / EDGE, [(a % EDGE, weight_a), (b % EDGE, if same { weight_b } else { 0.0 })]);
+    let second = (!same && weight_b != 0.0).then_some((b / EDGE, [(b % EDGE, weight_b), (b % EDGE, 0.0)]));
+    std::iter::once(first).chain(second)
 }
 
 /// The layout within a budget, with the material's own dictionaries, whose bytes are not counted.

@@ -2,9 +2,10 @@
 //!
 //! Modes are x, y, view, and light with colour, as in the comparison of Ruiters and Klein (2009). Each matrix holds the leading eigenvectors of
 //! its mode's Gram matrix (HOSVD). As they store it, the spatial modes keep half of the rows and columns; to be fast, a renderer multiplies the
-//! core by them beforehand, which takes four times the memory and is what [`Tucker::operations`] counts.
+//! core by them beforehand, which takes four times the memory and is what [`Decoded`] does.
 
 use super::Row;
+use super::decoder::{At, Blend, Decoder, add_row, dot};
 use super::pca::{Domain, Pca, decode_and_compare, pass, quantised};
 use crate::error::Result;
 use crate::linear::{Basis, eigenbasis, product, product_at, product_bt};
@@ -97,18 +98,8 @@ impl Tucker<'_, '_> {
         numbers * width + 8 + 8 * (v * l + kx + ky + v + l)
     }
 
-    /// Multiplications of a filtered sample with the spatial modes multiplied beforehand: four texels' cores blended, three rows of view and nine of light
-    /// with colour, then the product.
-    pub fn operations(&self, views: usize, lights: usize) -> u64 {
-        let (v, l) = (views as u64, lights as u64);
-        4 * v * l + 3 * v + 9 * l + v * l + 3 * l + 12
-    }
-
-    /// Errors over all values, decoded from quantised factors.
-    ///
-    /// # Errors
-    /// If the data cannot be read.
-    pub fn measure(&self, views: usize, lights: usize, bits: u32) -> Result<Row> {
+    /// Decodes what so many columns of a width would store.
+    pub fn decoder(&self, views: usize, lights: usize, bits: u32) -> Decoded {
         let [kx, ky, kv, kl] = self.kept;
         let (views, lights) = (views.min(kv), lights.min(kl));
         let matrix = |basis: &Basis, columns: usize| quantised(&basis.entries, basis.columns, columns, bits);
@@ -126,19 +117,112 @@ impl Tucker<'_, '_> {
         for row in 0..height {
             product(&mut texels[row * width * angular..][..width * angular], &x, &by_y[row * kx * angular..][..kx * angular], [width, kx, angular], false);
         }
-        let (view_count, light_len) = (description.views.len(), description.lights.len() * 3);
-        let decode = |texel: usize, out: &mut [f32]| {
-            let mut by_view = vec![0.0; view_count * lights];
-            product(&mut by_view, &view, &texels[texel * angular..][..angular], [view_count, views, lights], false);
-            out.copy_from_slice(&self.pca.mean);
-            product_bt(out, &by_view, &light, [view_count, lights, light_len], true);
-        };
-        decode_and_compare(self.pca, self.bytes(views, lights, bits), &decode)
+        Decoded {
+            mean: self.pca.mean.clone(),
+            texels,
+            view,
+            light,
+            views,
+            lights,
+            light_count: description.lights.len(),
+            domain: self.pca.domain,
+            offset: self.pca.dataset.statistics().log_offset(),
+            width,
+            bytes: self.bytes(views, lights, bits),
+        }
     }
 
-    /// The domain of its errors.
-    pub fn domain(&self) -> Domain {
-        self.pca.domain
+    /// Errors over all values, decoded from quantised factors.
+    ///
+    /// # Errors
+    /// If the data cannot be read.
+    pub fn measure(&self, views: usize, lights: usize, bits: u32) -> Result<Row> {
+        let Decoded { mean, texels, view, light, views, lights, light_count, bytes, .. } = self.decoder(views, lights, bits);
+        let (view_count, light_len) = (view.len() / views, light_count * 3);
+        let decode = |texel: usize, out: &mut [f32]| {
+            let mut by_view = vec![0.0; view_count * lights];
+            product(&mut by_view, &view, &texels[texel * views * lights..][..views * lights], [view_count, views, lights], false);
+            out.copy_from_slice(&mean);
+            product_bt(out, &by_view, &light, [view_count, lights, light_len], true);
+        };
+        decode_and_compare(self.pca, bytes, &decode)
+    }
+}
+
+/// The decomposition decoded from what it stores, the spatial modes multiplied beforehand.
+pub struct Decoded {
+    mean: Vec<f32>,
+    /// `[texel][view column][light column]`.
+    texels: Vec<f32>,
+    /// `[view][column]`.
+    view: Vec<f32>,
+    /// `[light and colour][column]`.
+    light: Vec<f32>,
+    views: usize,
+    lights: usize,
+    light_count: usize,
+    domain: Domain,
+    offset: f32,
+    width: usize,
+    bytes: u64,
+}
+
+impl Decoded {
+    /// Rows of a matrix between directions.
+    #[inline(always)]
+    fn blended(matrix: &[f32], row_len: usize, blend: Blend, out: &mut [f32]) {
+        out.fill(0.0);
+        blend.parts().for_each(|(index, weight)| add_row(out, weight, &matrix[index * row_len..][..row_len]));
+    }
+}
+
+impl Decoder for Decoded {
+    fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    fn images(&self, lights: &[Blend], view: Blend, out: &mut [[f32; 3]]) {
+        let (texels, v, l) = (out.len() / lights.len(), self.views, self.lights);
+        let mut row = vec![0.0; v];
+        Decoded::blended(&self.view, v, view, &mut row);
+        let mut by_view = vec![0.0f32; texels * l];
+        for (out, core) in by_view.chunks_mut(l).zip(self.texels.chunks(v * l)) {
+            row.iter().zip(core.chunks(l)).for_each(|(&weight, core)| add_row(out, weight, core));
+        }
+        let mut rows = vec![0.0; lights.len() * 3 * l];
+        let mut values = vec![0.0f32; lights.len() * 3 * texels];
+        for (i, &light) in lights.iter().enumerate() {
+            Decoded::blended(&self.light, 3 * l, light, &mut rows[i * 3 * l..][..3 * l]);
+            let at = At { x: [(0, 1.0); 2], y: [(0, 1.0); 2], light, view };
+            for &(pair, weight) in at.pairs(self.light_count).iter() {
+                (0..3).for_each(|c| values[(i * 3 + c) * texels..][..texels].iter_mut().for_each(|x| *x += weight * self.mean[pair * 3 + c]));
+            }
+        }
+        product_bt(&mut values, &rows, &by_view, [lights.len() * 3, l, texels], true);
+        for (i, rgb) in out.iter_mut().enumerate() {
+            *rgb = std::array::from_fn(|c| self.domain.back(values[(i / texels * 3 + c) * texels + i % texels], self.offset));
+        }
+    }
+
+    fn filtered(&self, at: &At) -> [f32; 3] {
+        const MOST: usize = 256;
+        let (v, l) = (self.views, self.lights.min(MOST));
+        let (mut row, mut by_view, mut lights) = ([0.0f32; MOST], [0.0f32; MOST], [0.0f32; 3 * MOST]);
+        Decoded::blended(&self.view, v, at.view, &mut row[..v.min(MOST)]);
+        for (texel, weight) in at.texels(self.width) {
+            let core = &self.texels[texel * v * self.lights..][..v * self.lights];
+            row.iter().zip(core.chunks(self.lights)).for_each(|(&of_view, core)| add_row(&mut by_view[..l], weight * of_view, core));
+        }
+        Decoded::blended(&self.light, 3 * self.lights, at.light, &mut lights[..3 * l]);
+        let mut sum: [f32; 3] = std::array::from_fn(|c| dot(&by_view[..l], &lights[c * l..][..l]));
+        at.pairs(self.light_count).iter().for_each(|&(pair, weight)| (0..3).for_each(|c| sum[c] += weight * self.mean[pair * 3 + c]));
+        sum.map(|y| self.domain.back(y, self.offset))
+    }
+
+    fn operations(&self, at: &At) -> u64 {
+        let (v, l) = (self.views as u64, self.lights as u64);
+        let (of_views, of_lights) = (at.view.parts().count() as u64, at.light.parts().count() as u64);
+        of_views * v + 4 * (v + v * l) + of_lights * 3 * l + 3 * l + of_views * of_lights * 4 + self.domain.operations()
     }
 }
 

@@ -691,9 +691,10 @@ fn compare(args: CompareArgs) -> Result<u8> {
         }
     }
     let (reference, other) = (source(&a, &file_a), source(&b, &file_b));
-    let (description, offset) = match reference {
-        Source::Data(data) => (data.description().clone(), data.statistics().log_offset()),
-        Source::File(file, _) => (measure::describe(file), measure::log_offset(file)),
+    let (description, offset) = match (&a, &file_a) {
+        (_, Some(file)) => (measure::describe(file), measure::log_offset(file)),
+        (Given::Data(data), _) => (data.description().clone(), data.statistics().log_offset()),
+        (Given::File(..), None) => unreachable!("a file is opened or refused"),
     };
     let progress = Progress::new();
     let metrics = measure::compare(reference, other, &description, offset, args.peak, &|done, all| progress.tell("comparing", done, all))?;

@@ -124,7 +124,7 @@ fn walk_layer(material: &Selvedge<'_>, level: u32, layer: u32, axes: [selvedge::
 }
 
 /// Candidates of the direction's cell up to the one that holds it, and all edges of the hull where none does.
-fn locate(material: &Selvedge<'_>, start: u32, direction: Direction) -> u64 {
+pub fn locate(material: &Selvedge<'_>, start: u32, direction: Direction) -> u64 {
     let words = material.words();
     let asked = clamp_direction(direction);
     let (px, py) = (coarse_q14(asked.x_q18), coarse_q14(asked.y_q18));
