@@ -21,7 +21,7 @@
 //! | [`example`], [`extreme`], [`random`] | files that the specification and the tests use |
 //! | [`count`] | the price of a sample, walked |
 //! | [`vectors`], [`conform`] | the conformance suite, made of recipes; decoders held against it |
-//! | [`baseline`] | what the encoder is measured against |
+//! | [`baseline`], [`similarity`], [`speed`], [`report`] | what the encoder is measured against, how pictures and run times are compared, and the report of all |
 //! | [`cli`] | the program |
 //! | [`files`], [`error`] | whole writes, exit codes |
 
@@ -57,9 +57,12 @@ pub mod pyramid;
 pub mod quantise;
 pub mod random;
 pub mod read;
+pub mod report;
 pub mod sector;
 pub mod similarity;
 pub mod sparsebtf;
+pub mod speed;
+pub mod stability;
 pub mod story;
 pub mod synth;
 pub mod tensor;

@@ -11,7 +11,7 @@ use crate::transfer::log2;
 use crate::triangulate::project;
 use selvedge::direction_set::cosine_of;
 use selvedge::{Direction, Rgb, Selvedge};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::LN_2;
 use std::iter::StepBy;
 use std::ops::Range;
@@ -28,7 +28,7 @@ pub enum Source<'a> {
 }
 
 /// Largest difference and where it is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Place {
     /// Magnitude.
     pub difference: f32,
@@ -41,7 +41,7 @@ pub struct Place {
 }
 
 /// Metrics over all texels, pairs and colours.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Metrics {
     /// Numbers compared.
     pub count: u64,

@@ -31,15 +31,20 @@ pub fn false_colour(value: f32) -> [f32; 3] {
     std::array::from_fn(|c| STOPS[low][c] * (1.0 - part) + STOPS[low + 1][c] * part)
 }
 
+/// The error of `ln(x + offset)` over the three colours in false colour; `white` is the error that is white.
+pub fn log_error(decoded: &[[f32; 3]], reference: &[[f32; 3]], [width, height]: [usize; 2], offset: f32, white: f32) -> Picture {
+    Picture::from_fn(width, height, |x, y| {
+        let (a, b) = (decoded[y * width + x], reference[y * width + x]);
+        let square: f32 = a.iter().zip(b).map(|(a, b)| ((a + offset).ln() - (b + offset).ln()).powi(2)).sum();
+        false_colour((square / 3.0).sqrt() / white)
+    })
+}
+
 /// A decoded image, its reference and the error of `ln(x + offset)` in false colour, side by side; `white` is the error that
 /// is white.
 pub fn beside_error(decoded: &[[f32; 3]], reference: &[[f32; 3]], [width, height]: [usize; 2], offset: f32, white: f32, exposure: f32) -> Picture {
     let shown = |image: &[[f32; 3]]| Picture { width, height, pixels: image.to_vec() }.exposed(exposure);
-    let error = Picture::from_fn(width, height, |x, y| {
-        let (a, b) = (decoded[y * width + x], reference[y * width + x]);
-        let square: f32 = a.iter().zip(b).map(|(a, b)| ((a + offset).ln() - (b + offset).ln()).powi(2)).sum();
-        false_colour((square / 3.0).sqrt() / white)
-    });
+    let error = log_error(decoded, reference, [width, height], offset, white);
     // Enlarged, so that a small tile can be looked at.
     let factor = (256 / width.max(height)).max(1);
     Picture::beside(&[shown(decoded), shown(reference), error].map(|tile| tile.enlarged(factor)), 8)

@@ -8,6 +8,7 @@
 use super::Row;
 use super::decoder::{At, Blend, Decoder, add_row};
 use super::pca::{Domain, Pca, decode_and_compare, quantised};
+use crate::dataset::Dataset;
 use crate::error::Result;
 use crate::linear::{eigenbasis, product_bt};
 use crate::random::Random;
@@ -84,14 +85,24 @@ fn components_of(pca: &Pca<'_>, assigned: &[usize], cluster: usize, components: 
     (mean.iter().map(|&m| m as f32).collect(), columns)
 }
 
+/// Bytes at a width: the mean and components of each cluster with their scales, the number of each texel's cluster in bits, and
+/// its coefficients.
+pub fn bytes(data: &Dataset, clusters: usize, components: usize, bits: u32) -> u64 {
+    let (texels, columns) = (data.description().texels() as u64, data.description().texel_len() as u64);
+    let (clusters, components, width) = (clusters as u64, components as u64, bits as u64 / 8);
+    let number = (64 - (clusters - 1).leading_zeros()) as u64 * texels;
+    clusters * ((components + 1) * columns * width + 8 + 8 * components) + number.div_ceil(8) + texels * components * width
+}
+
 impl Clusters<'_, '_> {
-    /// Bytes at a width: the mean and components of each cluster with their scales, the number of each texel's cluster in bits, and
-    /// its coefficients.
+    /// Bytes at a width.
     pub fn bytes(&self, bits: u32) -> u64 {
-        let (texels, columns) = (self.assigned.len() as u64, self.pca.mean.len() as u64);
-        let (clusters, components, width) = (self.clusters as u64, self.components as u64, bits as u64 / 8);
-        let number = (64 - (clusters - 1).leading_zeros()) as u64 * texels;
-        clusters * ((components + 1) * columns * width + 8 + 8 * components) + number.div_ceil(8) + texels * components * width
+        bytes(self.pca.dataset, self.clusters, self.components, bits)
+    }
+
+    /// How many clusters and components.
+    pub fn describe(&self) -> String {
+        format!("{} clusters of {} components", self.clusters, self.components)
     }
 
     /// Decodes what a width would store.

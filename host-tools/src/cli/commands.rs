@@ -1,21 +1,19 @@
 //! The commands that make, compare and change files of materials: their options, and what they do with them.
 
+use super::encoding;
 use super::{Source as FileSource, parse_angles, print, print_json};
 use crate::blend::{Blend, blend};
-use crate::dataset::{Dataset, Description, Sample};
-use crate::dictionary::Ensemble;
+use crate::dataset::{Dataset, Sample};
 use crate::dictionary_file::{self, Training};
-use crate::encode::driver::{Event, Wish, encode_verified};
-use crate::encode::{Options, prepare};
 use crate::error::{Result, ToolError};
 use crate::folder::{self, ImportOptions};
 use crate::measure::{self, Metrics, Source};
-use crate::model::{MetadataModel, TransferModel};
+use crate::model::MetadataModel;
 use crate::progress::Progress;
 use crate::sector::Sector;
 use crate::synth::{self, Mesostructure};
 use crate::trim::{Keep, Trim, trim};
-use crate::{baseline::pca, files, measure::Place, picture, pyramid, read, tensor, train, write};
+use crate::{files, measure::Place, picture, read, train, write};
 use clap::{Args, Subcommand, ValueEnum};
 use selvedge::{Direction, Limits, Selvedge};
 use std::path::{Path, PathBuf};
@@ -30,7 +28,7 @@ pub enum Material {
     /// Train an ensemble of dictionaries on datasets, once, for materials that are not among them
     Train(TrainArgs),
     /// Encode a dataset for a goal in error, bytes or coefficients
-    Encode(Box<EncodeArgs>),
+    Encode(Box<encoding::EncodeArgs>),
     /// Compare two materials; exit codes as idiff: 0 same, 1 warning, 2 failure, 3 other sizes, 4 unreadable
     #[command(after_help = "Exit codes: 0 within the limits, 1 beyond --warn, 2 beyond --fail, 3 other sizes, 4 unreadable.")]
     Compare(CompareArgs),
@@ -49,7 +47,7 @@ fn parse_size(text: &str) -> std::result::Result<[usize; 2], String> {
     }
 }
 
-fn parse_three<T: std::str::FromStr + Copy>(text: &str) -> std::result::Result<[T; 3], String> {
+pub fn parse_three<T: std::str::FromStr + Copy>(text: &str) -> std::result::Result<[T; 3], String> {
     let parts: Option<Vec<T>> = text.split(',').map(|n| n.trim().parse().ok()).collect();
     match parts.as_deref() {
         Some(&[all]) => Ok([all; 3]),
@@ -58,7 +56,7 @@ fn parse_three<T: std::str::FromStr + Copy>(text: &str) -> std::result::Result<[
     }
 }
 
-fn parse_counts(text: &str) -> std::result::Result<[usize; 3], String> {
+pub fn parse_counts(text: &str) -> std::result::Result<[usize; 3], String> {
     parse_three::<usize>(text)?
         .map(|n| (1..=32_767).contains(&n).then_some(n))
         .into_iter()
@@ -67,11 +65,11 @@ fn parse_counts(text: &str) -> std::result::Result<[usize; 3], String> {
         .ok_or_else(|| "1 to 32767".into())
 }
 
-fn parse_positive(text: &str) -> std::result::Result<f64, String> {
+pub fn parse_positive(text: &str) -> std::result::Result<f64, String> {
     text.parse().ok().filter(|v: &f64| v.is_finite() && *v > 0.0).ok_or_else(|| "a positive number".into())
 }
 
-fn parse_bytes(text: &str) -> std::result::Result<u64, String> {
+pub fn parse_bytes(text: &str) -> std::result::Result<u64, String> {
     let (number, unit) = text.split_at(text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len()));
     let unit = match unit {
         "" | "B" => 1.0,
@@ -91,7 +89,7 @@ pub struct Threads {
 }
 
 impl Threads {
-    fn apply(&self) {
+    pub fn apply(&self) {
         if let Some(threads) = self.threads {
             // Fails only where a pool is there already, which no command makes before.
             let _ = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build_global();
@@ -302,288 +300,6 @@ fn licences(datasets: &[Dataset]) -> String {
     all.sort_unstable();
     all.dedup();
     all.join("; ")
-}
-
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
-enum Domain {
-    /// ln(x + a thousandth of the mean)
-    Log,
-    /// Linear radiance
-    Linear,
-}
-
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
-enum Method {
-    /// Blocks of a few products of four columns (SparseBTF 2023)
-    SparseEnsemble,
-    /// Texels of a few ABRDF atoms, these of a few light atoms (Ruiters and Klein 2009)
-    SparseTensor,
-}
-
-#[derive(Args)]
-pub struct EncodeArgs {
-    /// The dataset
-    dataset: PathBuf,
-    /// The file to write
-    #[arg(short, long)]
-    output: PathBuf,
-    /// Goal: root mean squared error, in the domain of --domain
-    #[arg(long, value_parser = parse_positive, group = "goal")]
-    rmse: Option<f64>,
-    /// Goal: peak signal to noise ratio of linear radiance against the largest value, decibels
-    #[arg(long, value_parser = parse_positive, group = "goal")]
-    psnr: Option<f64>,
-    /// Goal: bytes of the file, as 200000, 200k or 1.5M
-    #[arg(long, value_parser = parse_bytes, group = "goal")]
-    size: Option<u64>,
-    /// Goal: coefficients of a block in each channel, as 256,64,64
-    #[arg(long, value_parser = parse_counts, group = "goal")]
-    coefficients: Option<[usize; 3]>,
-    /// What --rmse is an error of
-    #[arg(long, value_enum, default_value = "log")]
-    domain: Domain,
-    /// Cap: operations of a filtered sample that the file may state
-    #[arg(long)]
-    operations: Option<u32>,
-    /// Texels along the side of a block, 1 to 16; chosen among 2, 4 and 8 if not given
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=16))]
-    edge: Option<u16>,
-    /// A trained dictionary; without it the material's own columns
-    #[arg(long)]
-    dictionary: Option<PathBuf>,
-    /// Name the dictionary instead of carrying its columns
-    #[arg(long, requires = "dictionary")]
-    external: bool,
-    /// Train this many dictionaries on the material itself
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=256), conflicts_with = "dictionary")]
-    own_dictionaries: Option<u16>,
-    /// Quality layers, 1 to 8
-    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=8))]
-    layers: u16,
-    /// Levels of detail, 1 to 15
-    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=15))]
-    levels: u16,
-    /// Bits of a value in each channel; chosen if not given
-    #[arg(long, value_parser = parse_three::<u32>)]
-    value_bits: Option<[u32; 3]>,
-    /// Domain that is coded
-    #[arg(long, value_enum, default_value = "log")]
-    transfer: Domain,
-    /// Offset of the logarithm; a thousandth of the mean if not given
-    #[arg(long, value_parser = parse_positive)]
-    offset: Option<f64>,
-    /// How the material is stored
-    #[arg(long, value_enum, default_value = "sparse-ensemble")]
-    method: Method,
-    /// Sparse tensor: light atoms, ABRDF atoms, entries of a fibre and coefficients of a texel, as 64,128,8,10; chosen if not given
-    #[arg(long, value_parser = parse_shape)]
-    shape: Option<[usize; 4]>,
-    /// Sparse tensor: components that training works in; memory grows with them, not with the data
-    #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u16).range(1..=2048))]
-    rank: u16,
-    /// Tell what was reached, as JSON, to stdout
-    #[arg(long)]
-    json: bool,
-    #[command(flatten)]
-    threads: Threads,
-}
-
-/// Four numbers in the ranges of chapter 12.
-fn parse_shape(text: &str) -> std::result::Result<[usize; 4], String> {
-    let numbers: Vec<usize> = text.split(',').map(|n| n.trim().parse().map_err(|_| format!("`{n}` is no number"))).collect::<std::result::Result<_, _>>()?;
-    let shape: [usize; 4] = numbers.try_into().map_err(|_| "four numbers: light atoms, ABRDF atoms, entries, coefficients".to_owned())?;
-    let most = [256, 1024, 32, 63];
-    if shape.iter().zip(most).all(|(n, most)| (1..=most).contains(n)) { Ok(shape) } else { Err(format!("1 to {most:?}")) }
-}
-
-/// What a sparse tensor reached.
-#[derive(serde::Serialize)]
-struct TensorReport {
-    bytes: usize,
-    ratio_to_binary16: f64,
-    operations: u32,
-    coefficients: usize,
-    shape: [usize; 4],
-    predicted_rms: f64,
-    /// Coefficients that were limited to the range of their atom.
-    limited: usize,
-    trained: tensor::fit::Trained,
-    metrics: Metrics,
-}
-
-fn encode_tensor(args: &EncodeArgs, data: &Dataset, coarser: &[Dataset]) -> Result<u8> {
-    let foreign = args.dictionary.is_some() || args.own_dictionaries.is_some() || args.edge.is_some() || args.coefficients.is_some();
-    if foreign || args.layers > 1 || args.offset.is_some() || args.operations.is_some() {
-        let options = "--dictionary, --own-dictionaries, --edge, --coefficients, --layers, --offset and --operations";
-        return Err(ToolError::Usage(format!("{options} are of --method sparse-ensemble")));
-    }
-    let domain = if args.transfer == Domain::Log { pca::Domain::Log } else { pca::Domain::Linear };
-    let goal = match (args.rmse, args.psnr, args.size) {
-        (Some(rms), ..) if args.domain == args.transfer => tensor::Goal::Rms(rms),
-        (Some(_), ..) => return Err(ToolError::Usage("--rmse needs --domain and --transfer to be the same with --method sparse-tensor".into())),
-        (_, Some(db), _) if args.transfer == Domain::Linear => tensor::Goal::Rms(data.statistics().largest as f64 / 10f64.powf(db / 20.0)),
-        (_, Some(_), _) => return Err(ToolError::Usage("--psnr needs --transfer linear with --method sparse-tensor".into())),
-        (_, _, Some(bytes)) => tensor::Goal::Size(bytes),
-        _ if args.shape.is_some() => tensor::Goal::All,
-        _ => return Err(ToolError::Usage("a goal is missing: --rmse, --psnr, --size, or --shape alone".into())),
-    };
-    let progress = Progress::new();
-    progress.tell("components", 0, 1);
-    let components = pca::pca(data, domain, args.rank as usize)?;
-    let training = tensor::fit::Training::default();
-    let shape = match args.shape {
-        Some([light_atoms, abrdf_atoms, entries, coefficients]) => tensor::fit::Shape { light_atoms, abrdf_atoms, entries, coefficients },
-        None => tensor::choose_shape(&components, 1 + coarser.len(), goal, training, |what, done, all| progress.tell(what, done, all)),
-    };
-    let options = tensor::Options { shape, goal, value_bits: args.value_bits.map(|bits| bits[0].min(15)), training };
-    let coarser: Vec<&Dataset> = coarser.iter().collect();
-    let encoded = tensor::encode(&components, &coarser, &options, |what, done, all| progress.tell(what, done, all))?;
-    let file = selvedge::open(&encoded.bytes, &Limits::NONE);
-    let file = file.map_err(|finding| ToolError::Mismatch(format!("the encoder wrote a file that breaks a rule: {finding}")))?;
-    let offset = data.statistics().log_offset();
-    let peak = Some(data.statistics().largest as f64);
-    let tell = |done, all| progress.tell("verifying", done, all);
-    let metrics = measure::compare(measure::Source::Data(data), measure::Source::File(&file, 0), data.description(), offset, peak, &tell)?;
-    progress.clear();
-    files::write(&args.output, &encoded.bytes)?;
-    if args.json {
-        let bytes = encoded.bytes.len();
-        print_json(&TensorReport {
-            bytes,
-            ratio_to_binary16: data.description().half_bytes() as f64 / bytes as f64,
-            operations: file.header().operations,
-            coefficients: encoded.coefficients,
-            shape: [shape.light_atoms, shape.abrdf_atoms, shape.entries, shape.coefficients],
-            predicted_rms: encoded.predicted_rms,
-            limited: encoded.limited,
-            trained: encoded.trained,
-            metrics,
-        })?;
-    }
-    Ok(0)
-}
-
-#[derive(serde::Serialize)]
-struct EncodeReport {
-    bytes: usize,
-    ratio_to_binary16: f64,
-    edge: usize,
-    operations: u32,
-    coefficients: [usize; 3],
-    predicted_rms: f64,
-    metrics: Metrics,
-}
-
-fn encode(args: EncodeArgs) -> Result<u8> {
-    args.threads.apply();
-    if args.method == Method::SparseTensor {
-        let data = Dataset::open(&args.dataset)?;
-        let beside = files::folder_of(&args.output);
-        let temporary = tempfile::Builder::new().prefix(".selvedge-").tempdir_in(beside).map_err(ToolError::io(beside))?;
-        let coarser = pyramid::levels(&data, args.levels as usize, temporary.path())?;
-        return encode_tensor(&args, &data, &coarser);
-    }
-    if args.shape.is_some() {
-        return Err(ToolError::Usage("--shape is of --method sparse-tensor".into()));
-    }
-    let wish = match (args.rmse, args.psnr, args.size, args.coefficients) {
-        (Some(rms), ..) if args.domain == Domain::Log => Wish::LogRms(rms),
-        (Some(rms), ..) => Wish::LinearRms(rms),
-        (_, Some(db), ..) => Wish::Psnr(db),
-        (_, _, Some(bytes), _) => Wish::Size(bytes),
-        (_, _, _, Some(counts)) => Wish::Coefficients(counts),
-        _ => return Err(ToolError::Usage("a goal is missing: --rmse, --psnr, --size or --coefficients".into())),
-    };
-    if args.value_bits.is_some_and(|bits| bits.iter().any(|b| !(1..=16).contains(b))) {
-        return Err(ToolError::Usage("--value-bits: 1 to 16".into()));
-    }
-    if args.offset.is_some_and(|offset| !(1.2e-38..=1.0).contains(&offset)) {
-        return Err(ToolError::Usage("--offset: a normal number up to 1".into()));
-    }
-    let data = Dataset::open(&args.dataset)?;
-    let statistics = data.statistics();
-    let transfer = match args.transfer {
-        Domain::Log => TransferModel::Log2 { offset: args.offset.map_or(statistics.coded_offset(), |offset| offset as f32) },
-        // Values below 16, so that a texture is far below its bound of 32.
-        Domain::Linear => TransferModel::Linear { exponent: (statistics.largest.max(1e-30).log2().ceil() as i32 - 4).clamp(-60, 60) },
-    };
-    let beside = files::folder_of(&args.output);
-    let temporary = tempfile::Builder::new().prefix(".selvedge-").tempdir_in(beside).map_err(ToolError::io(beside))?;
-    let coarser = pyramid::levels(&data, args.levels as usize, temporary.path())?;
-    let progress = Progress::new();
-    let levels: Vec<&Dataset> = std::iter::once(&data).chain(&coarser).collect();
-    let prepared = prepare(levels, transfer, &|done, all| progress.tell("means and bases", done, all))?;
-
-    let dictionary = args.dictionary.as_deref().map(|path| dictionary_file::from_bytes(path, files::read(path)?)).transpose()?;
-    if let Some(dictionary) = &dictionary {
-        same_directions(dictionary, data.description())?;
-    }
-    let mut options = Options { layers: args.layers as usize, operations: args.operations, value_bits: args.value_bits, ..Options::default() };
-    options.edge = args.edge.map_or(0, |edge| edge as usize);
-    let mut trained = None;
-    if let Some(count) = args.own_dictionaries {
-        let edge = if options.edge == 0 { 4 } else { options.edge };
-        options.edge = edge;
-        trained = own_dictionaries(&data, count as usize, edge)?;
-    }
-    if let Some(dictionary) = &dictionary {
-        if args.external {
-            options.external = Some(dictionary.bytes.as_slice().into());
-        }
-        // The trained spatial bases are worth more than another edge.
-        if options.edge == 0 {
-            options.edge = dictionary.training.options.edge;
-        }
-    }
-    let ensembles = |edge: usize| -> [Ensemble; 3] {
-        match (&dictionary, &trained) {
-            (Some(dictionary), _) => dictionary.ensembles.each_ref().map(|e| e.with_edge(edge)),
-            (_, Some(trained)) => trained.ensembles.each_ref().map(|e| e.with_edge(edge)),
-            _ => prepared.own_ensembles(edge),
-        }
-    };
-    let verified = encode_verified(&prepared, &ensembles, wish, &options, &|event| match event {
-        Event::Pass(what, done, all) => progress.tell(what, done, all),
-        Event::Attempt(..) => progress.clear(),
-    })?;
-    progress.clear();
-    files::write(&args.output, &verified.encoded.bytes)?;
-    if args.json {
-        let bytes = verified.encoded.bytes.len();
-        print_json(&EncodeReport {
-            bytes,
-            ratio_to_binary16: data.description().half_bytes() as f64 / bytes as f64,
-            edge: verified.edge,
-            operations: verified.operations,
-            coefficients: verified.encoded.coefficients,
-            predicted_rms: verified.encoded.predicted_rms,
-            metrics: verified.metrics,
-        })?;
-    }
-    Ok(0)
-}
-
-/// An ensemble trained on the material that is encoded, at a sparsity near what its blocks will have.
-fn own_dictionaries(data: &Dataset, count: usize, edge: usize) -> Result<Option<train::Trained>> {
-    let texels = edge * edge;
-    let options = train::Options {
-        dictionaries: count,
-        sparsity: [4 * texels, texels.div_ceil(2), texels.div_ceil(2)],
-        edge,
-        blocks: (200_000 / texels).max(64),
-        iterations: 12,
-        ..train::Options::default()
-    };
-    train::train(&[data], &options, None, &mut |_| true)
-}
-
-fn same_directions(dictionary: &dictionary_file::DictionaryFile, description: &Description) -> Result<()> {
-    let near = |a: &[glam::DVec3], b: &[glam::DVec3]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (*a - *b).length() < 2e-4);
-    let training = &dictionary.training;
-    if near(&training.lights, &description.lights) && near(&training.views, &description.views) {
-        return Ok(());
-    }
-    Err(ToolError::Usage("the dictionary was trained for other directions than those of the dataset".into()))
 }
 
 /// A material given by its path: a dataset or a file.
@@ -864,7 +580,7 @@ pub fn run(command: Material) -> Result<u8> {
         Material::Synth(args) => synthesise(args),
         Material::Export(args) => export(args),
         Material::Train(args) => train_dictionary(args),
-        Material::Encode(args) => encode(*args),
+        Material::Encode(args) => encoding::encode(&args),
         Material::Compare(args) => compare_code(compare(args)),
         Material::Trim(args) => trim_file(args),
         Material::Blend(args) => blend_files(args),

@@ -3,6 +3,8 @@
 //! Exit codes: 0 good, 1 bad usage, 2 I/O, 3 invalid file, 4 over limits, 5 unsupported.
 
 mod commands;
+mod encoding;
+mod measuring;
 
 use crate::error::{Result, ToolError};
 use crate::{conform, demo, explain, files, inspect, kernel, sparsebtf, validate, vectors, write};
@@ -53,6 +55,8 @@ enum Command {
     },
     #[command(flatten)]
     Material(commands::Material),
+    #[command(flatten)]
+    Measuring(measuring::Measuring),
     /// Say what a file is
     Info {
         #[command(flatten)]
@@ -175,8 +179,9 @@ struct Source {
     limits: LimitArgs,
 }
 
+/// Limits of the caller.
 #[derive(Args)]
-struct LimitArgs {
+pub struct LimitArgs {
     /// Refuse files of more bytes
     #[arg(long, default_value_t = Limits::default().bytes)]
     max_bytes: u32,
@@ -320,6 +325,7 @@ fn run(cli: Cli) -> Result<u8> {
     match cli.command {
         Command::Demo { out } => demo::run(&out, &mut |line| eprintln!("{line}")).map(|()| 0),
         Command::Material(command) => commands::run(command),
+        Command::Measuring(command) => measuring::run(command),
         Command::Import { folder, output, images, .. } if sparsebtf::materials_in(&folder)?.is_empty() => {
             commands::import_images(&folder, &output, images).map(|()| 0)
         }

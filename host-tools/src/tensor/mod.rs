@@ -326,40 +326,64 @@ fn estimated_bytes(data: &Dataset, levels: usize, shape: Shape) -> u64 {
     (fixed + 4 * lights * shape.light_atoms + 2 * views * shape.abrdf_atoms * shape.entries) as u64 + (texels as f64 * list) as u64
 }
 
-/// A shape for a goal, by the estimate of Ruiters and Klein (section 4.2): for some sizes of the dictionaries one
-/// decomposition with long fibres and lists is made, and the errors of shorter ones are read from it as sums of those of both steps.
-pub fn choose_shape(pca: &Pca<'_>, levels: usize, goal: Goal, training: Training, mut tell: impl FnMut(&str, usize, usize)) -> Shape {
-    let values = (pca.dataset.description().texels() * pca.mean.len()) as f64;
-    let training = Training { iterations: training.iterations.min(6), rounds: 1, ..training };
-    let mut best: Option<(f64, Shape)> = None;
-    for [light_atoms, abrdf_atoms] in SIZES {
-        let [entries, coefficients] = TRIAL;
-        let fitted = fit(pca, Shape { light_atoms, abrdf_atoms, entries, coefficients }, training, &mut tell);
-        for entries in 2..=entries {
-            for coefficients in 2..=coefficients {
-                let shape = Shape { light_atoms, abrdf_atoms, entries, coefficients };
-                let error = ((fitted.of_texels[coefficients] + fitted.of_fibres[entries]) / values).sqrt();
-                let bytes = estimated_bytes(pca.dataset, levels, shape);
-                // What misses the goal is worse than all that meet it, by how far it misses.
-                let worth = match goal {
-                    Goal::Size(size) if bytes > size => 1e30 * bytes as f64,
-                    Goal::Size(_) => error,
-                    Goal::Rms(rms) if error > rms => 1e30 * error,
-                    Goal::Rms(_) => bytes as f64,
-                    Goal::All => error * (bytes as f64).sqrt(),
-                };
-                if best.is_none_or(|(least, _)| worth < least) {
-                    best = Some((worth, shape));
+/// Errors of shorter fibres and lists of one trial decomposition.
+struct Trial {
+    light_atoms: usize,
+    abrdf_atoms: usize,
+    of_texels: Vec<f64>,
+    of_fibres: Vec<f64>,
+}
+
+/// What the shape for a goal is chosen by: for some sizes of the dictionaries one decomposition with long fibres and lists. The same for all goals.
+pub struct Trials<'a, 'd> {
+    pca: &'a Pca<'d>,
+    trials: Vec<Trial>,
+}
+
+impl<'a, 'd> Trials<'a, 'd> {
+    /// Makes the decompositions.
+    pub fn new(pca: &'a Pca<'d>, training: Training, mut tell: impl FnMut(&str, usize, usize)) -> Self {
+        let training = Training { iterations: training.iterations.min(6), rounds: 1, ..training };
+        let trial = |[light_atoms, abrdf_atoms]: [usize; 2]| {
+            let [entries, coefficients] = TRIAL;
+            let fitted = fit(pca, Shape { light_atoms, abrdf_atoms, entries, coefficients }, training, &mut tell);
+            Trial { light_atoms, abrdf_atoms, of_texels: fitted.of_texels, of_fibres: fitted.of_fibres }
+        };
+        Trials { pca, trials: SIZES.map(trial).into() }
+    }
+
+    /// A shape for a goal, by the estimate of Ruiters and Klein (section 4.2): errors of shorter fibres and lists are read from a decomposition as sums
+    /// of those of both steps.
+    pub fn choose(&self, levels: usize, goal: Goal) -> Shape {
+        let values = (self.pca.dataset.description().texels() * self.pca.mean.len()) as f64;
+        let mut best: Option<(f64, Shape)> = None;
+        for &Trial { light_atoms, abrdf_atoms, ref of_texels, ref of_fibres } in &self.trials {
+            for (entries, of_fibres) in of_fibres.iter().enumerate().skip(2) {
+                for (coefficients, of_texels) in of_texels.iter().enumerate().skip(2) {
+                    let shape = Shape { light_atoms, abrdf_atoms, entries, coefficients };
+                    let error = ((of_texels + of_fibres) / values).sqrt();
+                    let bytes = estimated_bytes(self.pca.dataset, levels, shape);
+                    // What misses the goal is worse than all that meet it, by how far it misses.
+                    let worth = match goal {
+                        Goal::Size(size) if bytes > size => 1e30 * bytes as f64,
+                        Goal::Size(_) => error,
+                        Goal::Rms(rms) if error > rms => 1e30 * error,
+                        Goal::Rms(_) => bytes as f64,
+                        Goal::All => error * (bytes as f64).sqrt(),
+                    };
+                    if best.is_none_or(|(least, _)| worth < least) {
+                        best = Some((worth, shape));
+                    }
                 }
             }
         }
+        // The estimate is rough: a little more room, of which the goal takes what it needs.
+        best.map_or(Shape { light_atoms: 64, abrdf_atoms: 128, entries: 8, coefficients: 10 }, |(_, shape)| Shape {
+            entries: shape.entries + 1,
+            coefficients: shape.coefficients + 3,
+            ..shape
+        })
     }
-    // The estimate is rough: a little more room, of which the goal takes what it needs.
-    best.map_or(Shape { light_atoms: 64, abrdf_atoms: 128, entries: 8, coefficients: 10 }, |(_, shape)| Shape {
-        entries: shape.entries + 1,
-        coefficients: shape.coefficients + 3,
-        ..shape
-    })
 }
 
 /// Values of the components' domain in the units that channels are mixed of.
