@@ -176,12 +176,12 @@ fn timed(reference: &Reference, reference_rates: &mut Vec<f64>, mut run: impl Fn
     Rate { median: median_rate, least: rates[0], most: rates[RUNS - 1], to_reference: median(&mut ratios) }
 }
 
-/// Parts of a list that is gone through again and again, `samples` in all.
-fn parts(queries: &[FilteredQuery], samples: usize) -> impl Iterator<Item = &[FilteredQuery]> {
-    let batches = queries.len() / BATCH;
-    (0..samples.div_ceil(BATCH)).map(move |i| {
-        let part = &queries[i % batches * BATCH..][..BATCH];
-        &part[..BATCH.min(samples - i * BATCH)]
+/// Parts of `length` of a list that is gone through again and again, `samples` in all.
+fn parts(queries: &[FilteredQuery], samples: usize, length: usize) -> impl Iterator<Item = &[FilteredQuery]> {
+    let count = queries.len() / length;
+    (0..samples.div_ceil(length)).map(move |i| {
+        let part = &queries[i % count * length..][..length];
+        &part[..length.min(samples - i * length)]
     })
 }
 
@@ -198,7 +198,7 @@ fn measure<S>(
     let mut one = scratch();
     let mut on_one = |queries: &[FilteredQuery], of_reference: &mut Vec<f64>| {
         timed(&reference, of_reference, |samples| {
-            parts(queries, samples).for_each(|part| {
+            parts(queries, samples, BATCH).for_each(|part| {
                 black_box(batch(&mut one, part));
             })
         })
@@ -206,7 +206,9 @@ fn measure<S>(
     let (random_one, coherent_one) = (on_one(&random, &mut of_reference), on_one(&coherent, &mut of_reference));
     let on_all = |queries: &[FilteredQuery], of_reference: &mut Vec<f64>| {
         timed(&reference, of_reference, |samples| {
-            let all: Vec<&[FilteredQuery]> = parts(queries, samples).collect();
+            // Several for each core, so that none waits for long.
+            let length = (samples / (4 * rayon::current_num_threads())).clamp(64, BATCH);
+            let all: Vec<&[FilteredQuery]> = parts(queries, samples, length).collect();
             all.par_iter().for_each_init(&scratch, |scratch, part| {
                 black_box(batch(scratch, part));
             });

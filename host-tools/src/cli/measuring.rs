@@ -53,6 +53,9 @@ pub struct ReportArgs {
     /// Components that decompositions are made with
     #[arg(long, default_value_t = Request::default().rank as u16, value_parser = clap::value_parser!(u16).range(1..=2048))]
     rank: u16,
+    /// Only methods whose names contain one of these, as "linear" or "tensor,PCA"
+    #[arg(long, value_delimiter = ',')]
+    methods: Vec<String>,
     /// Do not measure at held out directions, which encodes each method once more
     #[arg(long)]
     no_held_out: bool,
@@ -156,6 +159,7 @@ fn make_report(args: ReportArgs) -> Result<u8> {
         ratios: args.ratios,
         rank: args.rank as usize,
         held_out: !args.no_held_out,
+        methods: args.methods,
         every: args.every.map(usize::from),
     };
     let files = request.out.join("files");

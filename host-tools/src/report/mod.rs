@@ -33,6 +33,8 @@ pub struct Request {
     pub rank: usize,
     /// Whether directions are held out as well.
     pub held_out: bool,
+    /// Methods whose names contain one of these; all if empty.
+    pub methods: Vec<String>,
     /// Errors are taken at every so many-th light of each view, the first of them moving from view to view; `None` for as many as keep
     /// [`COMPARED`].
     pub every: Option<usize>,
@@ -43,7 +45,15 @@ pub const COMPARED: usize = 9_000_000;
 
 impl Default for Request {
     fn default() -> Request {
-        Request { datasets: Vec::new(), out: PathBuf::new(), ratios: vec![1600.0, 800.0, 400.0, 200.0], rank: 160, held_out: true, every: None }
+        Request {
+            datasets: Vec::new(),
+            out: PathBuf::new(),
+            ratios: vec![1600.0, 800.0, 400.0, 200.0],
+            rank: 160,
+            held_out: true,
+            methods: Vec::new(),
+            every: None,
+        }
     }
 }
 
@@ -349,6 +359,11 @@ pub fn forget_peak() {
     let _ = std::fs::write("/proc/self/clear_refs", "5");
 }
 
+/// A text as a cell of CSV (RFC 4180).
+fn quoted(text: &str) -> String {
+    format!("\"{}\"", text.replace('"', "\"\""))
+}
+
 /// The table as CSV.
 pub fn to_csv(lines: &[Line]) -> String {
     let mut text = String::from(
@@ -359,9 +374,9 @@ pub fn to_csv(lines: &[Line]) -> String {
         let (m, s) = (&l.metrics, &l.speed);
         let kind = if l.kind == Kind::File { "file" } else { "baseline" };
         let cells = [
-            l.dataset.clone(),
-            l.method.clone(),
-            format!("\"{}\"", l.setting),
+            quoted(&l.dataset),
+            quoted(&l.method),
+            quoted(&l.setting),
             kind.into(),
             l.bytes.to_string(),
             m.linear_rms.to_string(),
@@ -448,6 +463,23 @@ mod tests {
         assert!(store.known("10 5").is_some() && store.known("11 5").is_none());
         store.add(line(30, 3.0)).expect("added");
         assert_eq!(Store::<Line>::open(path).expect("opened").lines.len(), 3);
+    }
+
+    #[test]
+    fn every_row_of_the_csv_has_as_many_cells_as_its_head() {
+        let odd = Line { method: "a, \"b\"".into(), setting: "c,d".into(), ..line(1, 1.0) };
+        let text = to_csv(&[odd, line(2, 2.0)]);
+        let cells = |row: &str| {
+            let (mut inside, mut count) = (false, 1);
+            row.chars().for_each(|c| {
+                inside ^= c == '"';
+                count += usize::from(c == ',' && !inside);
+            });
+            count
+        };
+        let counts: Vec<usize> = text.lines().map(cells).collect();
+        assert!(counts.len() == 3 && counts.iter().all(|n| *n == counts[0]), "{counts:?}");
+        assert!(text.contains("\"a, \"\"b\"\"\""));
     }
 
     #[test]

@@ -89,6 +89,7 @@ pub fn draw(lines: &[&Line], cost: &Axis, error: &Axis) -> Result<String, String
     let mut svg = String::new();
     {
         let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
+        root.fill(&WHITE).map_err(told)?;
         let (area, legend) = root.split_horizontally(SIZE.0 - LEGEND);
         let mut chart = ChartBuilder::on(&area)
             .margin(12)
@@ -100,6 +101,9 @@ pub fn draw(lines: &[&Line], cost: &Axis, error: &Axis) -> Result<String, String
             .configure_mesh()
             .x_desc(cost.name)
             .y_desc(error.name)
+            .x_labels(7)
+            .y_labels(8)
+            .max_light_lines(0)
             .x_label_formatter(&|v| short(*v))
             .y_label_formatter(&|v| short(*v))
             .light_line_style(RGBColor(242, 242, 242))

@@ -364,7 +364,8 @@ pub fn measure(request: &Request, path: &Path, adapter: &Adapter, lines: &mut St
     let pictured = budgets[budgets.len() / 2];
 
     let known: std::collections::BTreeSet<String> = lines.lines.iter().map(|line| line.key.clone()).collect();
-    let wanted = |method: &str, budget: u64| !known.contains(&key(method, budget));
+    let asked = |method: &str| request.methods.is_empty() || request.methods.iter().any(|m| method.contains(m.as_str()));
+    let wanted = |method: &str, budget: u64| asked(method) && !known.contains(&key(method, budget));
     let finder_bytes = finder(&data)?;
     let finder_file = opened(&finder_bytes)?;
     let finds = locator(&finder_file, &data);
@@ -414,7 +415,7 @@ pub fn measure(request: &Request, path: &Path, adapter: &Adapter, lines: &mut St
     everything(&data, request.rank, &budgets, &mut Visitor { wanted: &wanted, visit: &mut visit, say: &say_name })?;
     if request.held_out {
         let known: std::collections::BTreeSet<String> = held.lines.iter().map(|line| line.key.clone()).collect();
-        let wanted = |method: &str, budget: u64| !known.contains(&key(method, budget));
+        let wanted = |method: &str, budget: u64| asked(method) && !known.contains(&key(method, budget));
         hold_out(request, &data, &name, pictured, bench.every, &wanted, &key, held, &say_name)?;
     }
     Ok(())

@@ -377,12 +377,12 @@ impl<'a, 'd> Trials<'a, 'd> {
                 }
             }
         }
-        // The estimate is rough: a little more room, of which the goal takes what it needs.
-        best.map_or(Shape { light_atoms: 64, abrdf_atoms: 128, entries: 8, coefficients: 10 }, |(_, shape)| Shape {
-            entries: shape.entries + 1,
-            coefficients: shape.coefficients + 3,
-            ..shape
-        })
+        let Some((_, shape)) = best else { return Shape { light_atoms: 64, abrdf_atoms: 128, entries: 8, coefficients: 10 } };
+        // The estimate is rough: a little more room, of which the goal takes what it needs. Lists can be shortened to a size, fibres cannot.
+        let longer = Shape { entries: shape.entries + 1, ..shape };
+        let fits = |size| estimated_bytes(self.pca.dataset, levels, longer) <= size;
+        let entries = if matches!(goal, Goal::Size(size) if !fits(size)) { shape.entries } else { longer.entries };
+        Shape { entries, coefficients: shape.coefficients + 3, ..shape }
     }
 }
 
