@@ -35,7 +35,7 @@ struct Json<'a> {
 
 const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:1180px;margin:2em auto;padding:0 1em;color:#222}\
 h1{font-size:1.7em}h2{margin-top:2em;border-bottom:1px solid #ddd}table{border-collapse:collapse;font-size:13px;font-variant-numeric:tabular-nums}\
-td,th{padding:2px 8px;text-align:right;border-bottom:1px solid #eee;white-space:nowrap}td:first-child,th:first-child,td.t,th.t{text-align:left;white-space:normal}\
+td,th{padding:2px 8px;text-align:right;border-bottom:1px solid #eee;white-space:nowrap}td:first-child,th:first-child,td.t,th.t{text-align:left;white-space:normal;min-width:16em}td:first-child{min-width:8em}\
 th{border-bottom:2px solid #bbb;position:sticky;top:0;background:#fff}tr.file td:first-child{font-weight:600}tr.group td{border-top:1px solid #bbb}\
 figure{display:inline-block;margin:0 14px 14px 0;vertical-align:top}figcaption{font-size:13px;color:#444}img{image-rendering:pixelated;max-width:100%}\
 .wide{overflow-x:auto}p.note{color:#555;max-width:60em}";
@@ -81,7 +81,7 @@ fn datasets(lines: &[Line]) -> Vec<&str> {
     names
 }
 
-/// Bytes of every method at the errors that the sparse tensor and the sparse ensemble reached, by interpolation between its measured points.
+/// Bytes of every method at errors that files reached, by interpolation between its measured points.
 fn at_equal_error(lines: &[&Line], error: fn(&Line) -> f64) -> String {
     let mut methods: Vec<&str> = Vec::new();
     lines.iter().for_each(|l| {
@@ -102,14 +102,21 @@ fn at_equal_error(lines: &[&Line], error: fn(&Line) -> f64) -> String {
             (ba.ln() + part * (bb.ln() - ba.ln())).exp()
         })
     };
-    // Levels: what our methods reached, from coarse to fine.
-    let mut levels: Vec<f64> = lines.iter().filter(|l| l.kind == Kind::File && l.method != "uncompressed").map(|l| error(l)).filter(|e| *e > 0.0).collect();
+    // Levels: what files reached, those first at which most methods were measured on both sides, and apart from each other.
+    let coverage = |level: f64| methods.iter().filter(|method| bytes_at(method, level).is_some()).count();
+    let mut candidates: Vec<(usize, f64)> = lines.iter().filter(|l| l.kind == Kind::File).map(|l| error(l)).map(|level| (coverage(level), level)).collect();
+    candidates.sort_by(|a, b| b.0.cmp(&a.0).then(b.1.total_cmp(&a.1)));
+    let mut levels: Vec<f64> = Vec::new();
+    for (_, level) in candidates {
+        if levels.len() < 5 && level > 0.0 && levels.iter().all(|l| (l / level).ln().abs() > 0.08) {
+            levels.push(level);
+        }
+    }
     levels.sort_by(|a, b| b.total_cmp(a));
-    let levels: Vec<f64> = (0..4).filter_map(|i| levels.get((levels.len().max(1) - 1) * (2 * i + 1) / 8).copied()).collect();
     let mut html = String::from("<table><tr><th>method</th>");
     html.extend(levels.iter().map(|level| format!("<th>error {level:.4}</th>")));
     html += "</tr>";
-    for method in methods {
+    for &method in &methods {
         let file = lines.iter().any(|l| l.method == method && l.kind == Kind::File);
         let _ = write!(html, "<tr class=\"{}\"><td>{}</td>", if file { "file" } else { "" }, escaped(method));
         for &level in &levels {

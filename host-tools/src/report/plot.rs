@@ -67,6 +67,12 @@ fn trimmed(v: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
+/// One, two and five times the powers of ten of a range.
+fn ticks(range: &std::ops::Range<f64>) -> Vec<f64> {
+    let decades = range.start.log10().floor() as i32..=range.end.log10().ceil() as i32;
+    decades.flat_map(|e| [1.0, 2.0, 5.0].map(|m| m * 10f64.powi(e))).filter(|v| range.contains(v)).collect()
+}
+
 /// What draws can go wrong with: memory alone, so it is told as text.
 fn told(error: impl Display) -> String {
     error.to_string()
@@ -86,6 +92,7 @@ pub fn draw(lines: &[&Line], cost: &Axis, error: &Axis) -> Result<String, String
         let (least, most) = placed.iter().fold((f64::MAX, f64::MIN), |(a, b), (_, p)| (a.min(of(p)), b.max(of(p))));
         least / 1.25..most * 1.25
     };
+    let (x, y) = (range(|p| p.0), range(|p| p.1));
     let mut svg = String::new();
     {
         let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
@@ -95,14 +102,12 @@ pub fn draw(lines: &[&Line], cost: &Axis, error: &Axis) -> Result<String, String
             .margin(12)
             .x_label_area_size(46)
             .y_label_area_size(64)
-            .build_cartesian_2d(range(|p| p.0).log_scale(), range(|p| p.1).log_scale())
+            .build_cartesian_2d(x.clone().log_scale().with_key_points(ticks(&x)), y.clone().log_scale().with_key_points(ticks(&y)))
             .map_err(told)?;
         chart
             .configure_mesh()
             .x_desc(cost.name)
             .y_desc(error.name)
-            .x_labels(7)
-            .y_labels(8)
             .max_light_lines(0)
             .x_label_formatter(&|v| short(*v))
             .y_label_formatter(&|v| short(*v))
@@ -167,6 +172,12 @@ pub fn draw(lines: &[&Line], cost: &Axis, error: &Axis) -> Result<String, String
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn ticks_are_within_a_range() {
+        let found = ticks(&(0.03..0.6));
+        assert!(found.len() == 4 && found.iter().zip([0.05, 0.1, 0.2, 0.5]).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
+    }
 
     #[test]
     fn numbers_are_short() {
