@@ -1,7 +1,7 @@
 //! How fast filtered samples are, of files and of baselines: in turn with a reference in one run, medians with their range.
 //!
-//! Machines differ and are never quiet, so every measurement is paired: a run of the subject follows a run of the reference, which is the
-//! uncompressed interpolation of a small table ([`Reference`]), and the ratio of both is told beside the rate. Ratios are what two lines of
+//! Machines differ and are never quiet, so every measurement is paired: a run of the subject follows a run of the reference, which is a
+//! routine of fixed work, and the ratio of both is told beside the rate. Ratios are what two lines of
 //! a table may be compared by.
 
 use crate::baseline::decoder::{Decoder, Locator};

@@ -311,7 +311,7 @@ pub fn encode_fit(pca: &Pca<'_>, fitted: &Fit, coarser: &[&Dataset], options: &O
 }
 
 /// Sizes of dictionaries that are tried: light atoms and ABRDF atoms.
-pub const SIZES: [[usize; 2]; 3] = [[32, 64], [64, 128], [128, 256]];
+pub const SIZES: [[usize; 2]; 4] = [[16, 32], [32, 64], [64, 128], [128, 256]];
 /// Lists and fibres of the trial from which their lengths are chosen.
 const TRIAL: [usize; 2] = [12, 20];
 
