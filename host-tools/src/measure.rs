@@ -215,8 +215,8 @@ pub fn compare_every(
     let parts = description.views.len() * chunks;
     let work = |part: usize| -> Result<(Sums, f32)> {
         let (view, first) = (part / chunks, part % chunks * at_once);
-        // A step that shares no factor with most counts of lights, so that all lights have their turn.
-        let start = (view * 7 + first).next_multiple_of(every) - view * 7;
+        // The first from `first` on whose number leaves the same rest as the view's: every light has its turn.
+        let start = first + (view % every + every - first % every) % every;
         let range = (start..(first + at_once).min(lights)).step_by(every);
         let (mut a, mut b) = (Vec::new(), Vec::new());
         images(reference, description, view, range.clone(), &mut a)?;

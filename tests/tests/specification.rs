@@ -36,6 +36,7 @@ fn every_rule_that_a_comment_cites_is_in_the_specification() {
         "host-tools/src/baseline",
         "host-tools/src/encode",
         "host-tools/src/synth",
+        "host-tools/src/report",
         "host-tools/src/tensor",
         "host-tools/src/validate",
         "host-tools/src/cli",

@@ -260,7 +260,7 @@ impl Decoder for Decoded {
 
     fn operations(&self, at: &At) -> u64 {
         let (pairs, n, clusters) = (at.pairs(self.lights).len() as u64, self.components as u64, self.gathered(at).1 as u64);
-        4 * n + clusters * (n + 1) * pairs * 4 + self.domain.operations()
+        4 * n + pairs + clusters * (n + 1) * pairs * 4 + self.domain.operations()
     }
 }
 

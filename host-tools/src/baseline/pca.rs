@@ -151,7 +151,7 @@ impl Decoder for Decoded {
 
     fn operations(&self, at: &At) -> u64 {
         let (pairs, rank) = (at.pairs(self.lights).len() as u64, self.rank as u64);
-        4 * rank + pairs * (3 * rank + 6) + self.domain.operations()
+        4 * rank + pairs * (3 * rank + 7) + self.domain.operations()
     }
 }
 

@@ -304,6 +304,11 @@ impl Layout<'_> {
         Ok(row)
     }
 
+    /// Most coefficients of a block that were kept.
+    pub fn most(&self) -> usize {
+        self.most
+    }
+
     /// Decodes what so many coefficients of each block would store.
     pub fn decoder(&self, coefficients: usize) -> Decoded {
         let coefficients = coefficients.min(self.most);

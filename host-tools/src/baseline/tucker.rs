@@ -10,6 +10,9 @@ use super::pca::{Domain, Pca, decode_and_compare, pass, quantised};
 use crate::error::Result;
 use crate::linear::{Basis, eigenbasis, product, product_at, product_bt};
 
+/// Most columns of view, and of light, that a decoder works with.
+pub const MOST_COLUMNS: usize = 512;
+
 /// The decomposition at its largest size; smaller ones are parts of it.
 pub struct Tucker<'a, 'd> {
     pca: &'a Pca<'d>,
@@ -99,7 +102,11 @@ impl Tucker<'_, '_> {
     }
 
     /// Decodes what so many columns of a width would store.
+    ///
+    /// # Panics
+    /// With more columns than [`MOST_COLUMNS`].
     pub fn decoder(&self, views: usize, lights: usize, bits: u32) -> Decoded {
+        assert!(views <= MOST_COLUMNS && lights <= MOST_COLUMNS, "more columns than a sample has room for");
         let [kx, ky, kv, kl] = self.kept;
         let (views, lights) = (views.min(kv), lights.min(kl));
         let matrix = |basis: &Basis, columns: usize| quantised(&basis.entries, basis.columns, columns, bits);
@@ -205,10 +212,10 @@ impl Decoder for Decoded {
     }
 
     fn filtered(&self, at: &At) -> [f32; 3] {
-        const MOST: usize = 256;
-        let (v, l) = (self.views, self.lights.min(MOST));
+        const MOST: usize = MOST_COLUMNS;
+        let (v, l) = (self.views, self.lights);
         let (mut row, mut by_view, mut lights) = ([0.0f32; MOST], [0.0f32; MOST], [0.0f32; 3 * MOST]);
-        Decoded::blended(&self.view, v, at.view, &mut row[..v.min(MOST)]);
+        Decoded::blended(&self.view, v, at.view, &mut row[..v]);
         for (texel, weight) in at.texels(self.width) {
             let core = &self.texels[texel * v * self.lights..][..v * self.lights];
             row.iter().zip(core.chunks(self.lights)).for_each(|(&of_view, core)| add_row(&mut by_view[..l], weight * of_view, core));

@@ -296,7 +296,13 @@ fn choose(args: &EncodeArgs, data: &Dataset, coarser: &[Dataset], progress: &Pro
             }
         }
     }
-    reached.retain(|a| args.operations.is_none_or(|most| a.told.operations <= most));
+    if let Some(most) = args.operations {
+        let least = reached.iter().map(|a| a.told.operations).min();
+        reached.retain(|a| a.told.operations <= most);
+        if let (true, Some(least)) = (reached.is_empty(), least) {
+            failed.push(format!("the fewest operations of those that do otherwise are {least}"));
+        }
+    }
     let preference = args.prefer.unwrap_or(if args.size.is_some() { Preference::Error } else { Preference::Bytes });
     let worth = |a: &Attempt| match preference {
         Preference::Bytes => a.told.bytes as f64,

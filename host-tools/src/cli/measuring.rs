@@ -4,7 +4,7 @@ use super::commands::Threads;
 use super::{LimitArgs, print, print_json};
 use crate::error::{Result, ToolError};
 use crate::report::page::{Page, write_stability};
-use crate::report::{self, Operations, Request, Store, sweep};
+use crate::report::{Operations, Request, Store, sweep};
 use crate::speed::{self, Adapter, Rate, Speed};
 use crate::{count, files, stability};
 use clap::{Args, Subcommand};
@@ -168,9 +168,13 @@ fn make_report(args: ReportArgs) -> Result<u8> {
     let mut lines = Store::open(request.out.join("measured.jsonl"))?;
     let mut held = Store::open(request.out.join("held-out.jsonl"))?;
     let say = sweep::teller(args.quiet);
+    let mut asked = sweep::Asked::new();
     for path in &request.datasets {
-        report::sweep::measure(&request, path, &adapter, &mut lines, &mut held, &say)?;
+        asked.extend(sweep::measure(&request, path, &adapter, &mut lines, &mut held, &say)?);
     }
+    // Lines of other requests stay in the store, but not on this page.
+    lines.lines.retain(|line| asked.contains(&line.key));
+    held.lines.retain(|line| asked.contains(&line.key));
     let broken = if args.stability { stability_page(&request.out, &say)? } else { 0 };
     if request.datasets.is_empty() {
         return answer(broken);

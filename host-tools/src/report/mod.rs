@@ -85,6 +85,12 @@ pub struct Line {
     pub key: String,
     /// The dataset's name.
     pub dataset: String,
+    /// The picture of its data in the folder, which tells datasets of one name apart.
+    pub reference: String,
+    /// Adapter of the kernel's rate, or why there is none.
+    pub adapter: String,
+    /// Cores of the rates of all cores.
+    pub cores: usize,
     /// The method.
     pub method: String,
     /// Its setting.
@@ -109,13 +115,16 @@ pub struct Line {
     pub encode_seconds: f64,
     /// Seconds of `open`, for files.
     pub open_seconds: Option<f64>,
-    /// Largest resident memory while it was encoded, bytes, where the system tells it.
+    /// Largest resident memory since the work began that its method shares between settings, bytes, where the system tells it.
     pub peak_memory: Option<u64>,
     /// What training or encoding found and a user should know.
     pub found: String,
     /// Its picture in the folder, if it has one.
     pub picture: Option<String>,
 }
+
+/// Part of every key: changes with what is measured or how, so that lines of before are measured anew.
+pub const REVISION: u32 = 2;
 
 /// Errors of an encoding that did not see some directions.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -228,7 +237,7 @@ impl<'a> Bench<'a> {
         let (reference, offset) = (Source::Data(self.data), statistics.log_offset());
         let found = compare_every(self.every, reference, subject.source(self.locator), self.data.description(), offset, peak, &|_, _| ())?;
         // What is equal has no finite ratio, which a table of numbers could not hold.
-        Ok(Metrics { psnr_db: found.psnr_db.min(999.0), ..found })
+        Ok(Metrics { psnr_db: found.psnr_db.clamp(-999.0, 999.0), ..found })
     }
 
     /// Mean SSIM and FLIP over the pairs that are looked at.
@@ -296,14 +305,18 @@ pub struct Store<T> {
 }
 
 impl<T: Keyed> Store<T> {
-    /// Reads what is there; a line that was cut off by a crash is left out.
+    /// Reads what is there; a last line that was cut off by a crash is left out.
     ///
     /// # Errors
-    /// If the file cannot be read, or not be mended.
+    /// If the file cannot be read, or not be mended, or has a line that this version does not understand: nothing measured is thrown away.
     pub fn open(path: PathBuf) -> Result<Store<T>> {
         let text = if path.exists() { String::from_utf8_lossy(&files::read(&path)?).into_owned() } else { String::new() };
-        let lines: Vec<T> = text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
-        let whole: String = lines.iter().map(to_json_line).collect();
+        let whole = text.rfind('\n').map_or("", |end| &text[..=end]);
+        let parse = |(i, line): (usize, &str)| {
+            serde_json::from_str(line)
+                .map_err(|why| ToolError::Mismatch(format!("{}, line {}: of another version ({why}); begin in another folder", path.display(), i + 1)))
+        };
+        let lines: Vec<T> = whole.lines().enumerate().map(parse).collect::<Result<_>>()?;
         if whole != text {
             files::write(&path, whole.as_bytes())?;
         }
@@ -353,10 +366,9 @@ pub fn peak_memory() -> Option<u64> {
     line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kilobytes| kilobytes * 1024)
 }
 
-/// Begins to look for the largest memory anew.
-pub fn forget_peak() {
-    // Where there is no such file the peak is that of the whole process, or unknown.
-    let _ = std::fs::write("/proc/self/clear_refs", "5");
+/// Begins to look for the largest memory anew; false where the system cannot.
+pub fn forget_peak() -> bool {
+    std::fs::write("/proc/self/clear_refs", "5").is_ok()
 }
 
 /// A text as a cell of CSV (RFC 4180).
@@ -422,6 +434,9 @@ mod tests {
         Line {
             key: format!("{bytes} {rms}"),
             dataset: "d".into(),
+            reference: String::new(),
+            adapter: String::new(),
+            cores: 2,
             method: "m".into(),
             setting: String::new(),
             kind: Kind::File,

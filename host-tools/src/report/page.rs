@@ -71,14 +71,28 @@ fn operations(o: &Operations) -> String {
     format!("{}{stated}", with_thousands(o.mean.round() as u64))
 }
 
-fn datasets(lines: &[Line]) -> Vec<&str> {
-    let mut names: Vec<&str> = Vec::new();
+/// Datasets in the order of their lines: name and picture.
+fn datasets(lines: &[Line]) -> Vec<(&str, &str)> {
+    let mut names: Vec<(&str, &str)> = Vec::new();
     lines.iter().for_each(|l| {
-        if !names.contains(&l.dataset.as_str()) {
-            names.push(&l.dataset);
+        if !names.contains(&(&l.dataset, &l.reference)) {
+            names.push((&l.dataset, &l.reference));
         }
     });
     names
+}
+
+/// Lines of one dataset, methods together in the order in which they came, by bytes.
+fn sorted<'l>(lines: &'l [Line], reference: &str) -> Vec<&'l Line> {
+    let mut of: Vec<&Line> = lines.iter().filter(|l| l.reference == reference).collect();
+    let mut methods: Vec<&str> = Vec::new();
+    of.iter().for_each(|l| {
+        if !methods.contains(&l.method.as_str()) {
+            methods.push(&l.method);
+        }
+    });
+    of.sort_by_key(|l| (methods.iter().position(|m| *m == l.method), l.bytes));
+    of
 }
 
 /// Bytes of every method at errors that files reached, by interpolation between its measured points.
@@ -208,10 +222,11 @@ fn held_table(lines: &[&HeldOut]) -> String {
 }
 
 /// A picture as part of the page.
-fn embedded(out: &Path, name: &str) -> Result<String> {
+fn embedded(out: &Path, name: &str) -> String {
     use base64::Engine as _;
-    let bytes = files::read(&out.join(name))?;
-    Ok(format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(bytes)))
+    // One that was taken away since leaves its words.
+    let bytes = files::read(&out.join(name)).unwrap_or_default();
+    format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(bytes))
 }
 
 /// The table of cases of [`crate::stability`], as `stability.html` and `stability.json`.
@@ -225,7 +240,7 @@ pub fn write_stability(verdicts: &[Verdict], out: &Path) -> Result<()> {
     let mut html = format!(
         "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>Numerical stability</title><style>{STYLE}td.bad{{background:#c00;color:#fff}}td.good{{color:#060}}</style>\
 <h1>Numerical stability</h1><p class=\"note\">{} cases, stiff and extreme; {}. Each has a bound that follows from its source, and is measured by the very routines that train, encode and decode. \
-<a href=\"report.html\">Error against run time</a></p><div class=\"wide\"><table><tr><th>case</th><th>condition</th><th class=\"t\">which is</th><th>bound</th><th>measured</th><th>part of the bound</th><th>verdict</th><th class=\"t\">where the bound comes from</th></tr>",
+</p><div class=\"wide\"><table><tr><th>case</th><th>condition</th><th class=\"t\">which is</th><th>bound</th><th>measured</th><th>part of the bound</th><th>verdict</th><th class=\"t\">where the bound comes from</th></tr>",
         verdicts.len(),
         if broken == 0 { "all keep their bounds".to_owned() } else { format!("{broken} do not keep their bounds") }
     );
@@ -282,12 +297,14 @@ impl Page<'_> {
 <p class=\"note\">Methods of this format (bold) and baselines, each over a sweep of its size. Files are decoded by the core, bit for bit as any decoder would; baselines are decoded in \
 binary32 from what they would store. RMS, PSNR (peak: the largest value of the data), relative L2 and the largest error are over every texel and view, and the lights that a dataset's heading states; <i>log</i> is ln(x + e) with e one thousandth of the mean. SSIM and FLIP \
 (67 pixels a degree) are means over 64 pairs of directions, of pictures exposed so that the mean of the data is 0.4. Rates are millions of filtered RGB samples a second: medians of five runs, \
-each in turn with a reference routine, with the farther end of their range. Operations are 32-bit multiplications of values. Kernel: {}.</p>{}",
+each in turn with a reference routine, with the farther end of their range. In <i>random</i> and <i>coherent</i> files are sampled in batches of 8192, which locate directions and read records together, as a renderer that sorts its \
+samples would; baselines have no batches. <i>One by one</i> has none for either. Operations are multiplications of a filtered sample: of 32-bit integers in files, with 102 for matrix, transfer and \
+presentation, of floats in baselines, with seven for an exponential. Peak memory is since the work began that a method's settings share. Kernel: {}.</p>{}",
             escaped(adapter),
             if self.stability { "<p><a href=\"stability.html\">Numerical stability on stiff and extreme cases</a></p>" } else { "" }
         );
-        for name in datasets(lines) {
-            let of: Vec<&Line> = lines.iter().filter(|l| l.dataset == name).collect();
+        for (name, reference) in datasets(lines) {
+            let of = sorted(lines, reference);
             let (every, peak) = of.first().map_or((1, 0.0), |l| (l.every, l.metrics.peak));
             let lights = if every == 1 { "at every light".to_owned() } else { format!("at one light of {every}, another at each view") };
             let _ = write!(html, "<h2>{}</h2><p class=\"note\">Compared {lights}; largest value {peak}.</p>", escaped(name));
@@ -295,7 +312,7 @@ each in turn with a reference routine, with the farther end of their range. Oper
                 for cost in &COSTS {
                     match draw(&of, cost, error) {
                         Ok(svg) => {
-                            files::write(&out.join(format!("{name}-{}-{}.svg", error.short, cost.short)), svg.as_bytes())?;
+                            files::write(&out.join(format!("{}-{}-{}.svg", reference.trim_end_matches("-data.png"), error.short, cost.short)), svg.as_bytes())?;
                             let _ = write!(
                                 html,
                                 "<figure>{svg}<figcaption>{} against {}. Dashed: values coded without a logarithm.</figcaption></figure>",
@@ -314,10 +331,9 @@ each in turn with a reference routine, with the farther end of their range. Oper
             );
             html +=
                 "<h3>Pictures</h3><p class=\"note\">Two pairs of directions, decoded and the error of the logarithm in false colour (black none, white 2).</p>";
-            let reference = format!("{}-reference.png", super::sweep::slug(name));
-            let _ = write!(html, "<figure><img src=\"{}\" alt=\"the data\"><figcaption>the data</figcaption></figure><br>", embedded(out, &reference)?);
+            let _ = write!(html, "<figure><img src=\"{}\" alt=\"the data\"><figcaption>the data</figcaption></figure><br>", embedded(out, reference));
             for l in of.iter().filter(|l| l.picture.is_some()) {
-                let source = embedded(out, l.picture.as_deref().unwrap_or_default())?;
+                let source = embedded(out, l.picture.as_deref().unwrap_or_default());
                 let _ = write!(
                     html,
                     "<figure><img src=\"{source}\" alt=\"{0}\"><figcaption>{0}, {1} bytes; log RMS {2:.3}, linear RMS {3:.4}, FLIP {4:.3}</figcaption></figure>",
@@ -334,7 +350,7 @@ each in turn with a reference routine, with the farther end of their range. Oper
                 let _ = write!(
                     html,
                     "<h3>Directions held out</h3><p class=\"note\">The same budget without every seventh direction inside the hemisphere; errors at pairs that were encoded, and at pairs of a light and a view that \
-were not. What interpolation between directions loses stands in the line of the uncompressed data.</p>{}",
+were not. The uncompressed data lose there too, by interpolating between directions; they are blended as radiance, where methods in the logarithm blend logarithms.</p>{}",
                     held_table(&held)
                 );
             }

@@ -22,7 +22,11 @@ pub struct Axis {
 /// Costs that errors are drawn over.
 pub const COSTS: [Axis; 3] = [
     Axis { name: "bytes", short: "bytes", of: |l| Some(l.bytes as f64) },
-    Axis { name: "time of a filtered sample, one core, random, ns", short: "time", of: |l| Some(l.speed.random.median).filter(|r| *r > 0.0).map(|r| 1e9 / r) },
+    Axis {
+        name: "time of a filtered sample, ns (one core, random; files in batches)",
+        short: "time",
+        of: |l| Some(l.speed.random.median).filter(|r| *r > 0.0).map(|r| 1e9 / r),
+    },
     Axis { name: "operations of a filtered sample (mean)", short: "operations", of: |l| Some(l.operations.mean) },
 ];
 
@@ -83,7 +87,7 @@ fn told(error: impl Display) -> String {
 /// # Errors
 /// If there is nothing to draw.
 pub fn draw(lines: &[&Line], cost: &Axis, error: &Axis) -> Result<String, String> {
-    let place = |l: &Line| Some(((cost.of)(l)?, (error.of)(l)?));
+    let place = |l: &Line| Some(((cost.of)(l)?, (error.of)(l)?)).filter(|(a, b)| a.is_finite() && b.is_finite() && *a > 0.0);
     let placed: Vec<(&Line, (f64, f64))> = lines.iter().filter_map(|l| Some((*l, place(l)?))).collect();
     if placed.is_empty() {
         return Err("nothing was measured".into());

@@ -1,6 +1,6 @@
 //! The sweep: every method at every budget, made, measured and kept.
 
-use super::{Bench, HeldOut, Kind, Line, Request, Store, Subject, forget_peak, peak_memory};
+use super::{Bench, HeldOut, Kind, Line, REVISION, Request, Store, Subject, forget_peak, peak_memory};
 use crate::baseline::data::Uncompressed;
 use crate::baseline::decoder::{Decoder, Locator};
 use crate::baseline::pca::{Domain, pca};
@@ -13,6 +13,8 @@ use crate::speed::{self, Adapter};
 use crate::tensor::{self, fit};
 use crate::{files, progress::Progress};
 use selvedge::Limits;
+use std::cell::{Cell, RefCell};
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::time::Instant;
 
@@ -43,9 +45,16 @@ struct Visitor<'v> {
     wanted: &'v dyn Fn(&str, u64) -> bool,
     visit: &'v mut dyn FnMut(Made) -> Result<()>,
     say: &'v dyn Fn(&str),
+    /// Whether the system tells the largest memory since the last beginning.
+    knows_peak: &'v Cell<bool>,
 }
 
 impl Visitor<'_> {
+    /// Work begins that the settings of a method share.
+    fn begin(&self) {
+        self.knows_peak.set(forget_peak());
+    }
+
     /// The budgets that are wanted of a method.
     fn budgets(&self, method: &str, budgets: &[u64]) -> Vec<u64> {
         budgets.iter().copied().filter(|&budget| (self.wanted)(method, budget)).collect()
@@ -73,6 +82,7 @@ fn ensembles(data: &Dataset, domain: Domain, edges: &[usize], budgets: &[u64], v
     if edges.iter().all(|&edge| visitor.budgets(&method(edge), budgets).is_empty()) {
         return Ok(());
     }
+    visitor.begin();
     let begun = Instant::now();
     let prepared = prepare(vec![data], tensor::transfer_of(data, domain), &|_, _| ())?;
     let shared = begun.elapsed().as_secs_f64();
@@ -105,6 +115,7 @@ fn components(data: &Dataset, domain: Domain, rank: usize, budgets: &[u64], visi
     if all.iter().all(|method| visitor.budgets(method, budgets).is_empty()) {
         return Ok(());
     }
+    visitor.begin();
     (visitor.say)(&format!("{rank} components, {}", name_of(domain)));
     let begun = Instant::now();
     let mut whole = pca(data, domain, rank)?;
@@ -113,7 +124,10 @@ fn components(data: &Dataset, domain: Domain, rank: usize, budgets: &[u64], visi
     for budget in visitor.budgets(&of_pca, budgets) {
         (visitor.say)(&format!("{of_pca} at {budget} bytes"));
         let begun = Instant::now();
-        let Some(choice) = whole.best_at(budget)? else { continue };
+        let Some(choice) = whole.best_at(budget)? else {
+            (visitor.say)(&format!("{of_pca}: left out, {budget} bytes are fewer than the mean takes"));
+            continue;
+        };
         (visitor.visit)(Made {
             method: of_pca.clone(),
             budget,
@@ -177,7 +191,10 @@ fn components(data: &Dataset, domain: Domain, rank: usize, budgets: &[u64], visi
                 best = Some((error, made));
             }
         }
-        let Some((_, made)) = best else { continue };
+        let Some((_, made)) = best else {
+            (visitor.say)(&format!("{of_clusters}: left out, {budget} bytes are too few for two clusters"));
+            continue;
+        };
         (visitor.visit)(Made {
             method: of_clusters.clone(),
             budget,
@@ -195,9 +212,10 @@ fn components(data: &Dataset, domain: Domain, rank: usize, budgets: &[u64], visi
         let [width, height] = data.description().size.map(|n| n.div_ceil(2) as u64);
         // Columns of view and light whose product fits: light has colour, so it gets more.
         let columns = |budget: u64| {
+            let description = data.description();
             let product = (budget as f64 / (width * height) as f64).max(2.0);
-            let views = (product / 3.0).sqrt().max(1.0);
-            [views as usize, (product / views) as usize]
+            let views = ((product / 3.0).sqrt().max(1.0) as usize).min(description.views.len());
+            [views, ((product / views as f64) as usize).min(3 * description.lights.len()).min(tucker::MOST_COLUMNS)]
         };
         let [views, lights] = columns(most);
         let decomposed = tucker::tucker(&whole, views.max(1), lights.max(1))?;
@@ -231,6 +249,7 @@ fn sparsebtf(data: &Dataset, budgets: &[u64], visitor: &mut Visitor<'_>) -> Resu
     const METHOD: &str = "SparseBTF as published";
     let wanted = visitor.budgets(METHOD, budgets);
     let Some(&most) = wanted.iter().max() else { return Ok(()) };
+    visitor.begin();
     (visitor.say)(METHOD);
     let begun = Instant::now();
     let source = published::Published::new(data)?;
@@ -243,7 +262,7 @@ fn sparsebtf(data: &Dataset, budgets: &[u64], visitor: &mut Visitor<'_>) -> Resu
             (visitor.say)(&format!("{METHOD}: left out, its tables alone have {fixed} bytes"));
             continue;
         };
-        let coefficients = (rest / (source.bytes(1) - fixed)) as usize;
+        let coefficients = ((rest / (source.bytes(1) - fixed)) as usize).min(layout.most());
         (visitor.visit)(Made {
             method: METHOD.into(),
             budget,
@@ -262,6 +281,7 @@ fn uncompressed(data: &Dataset, visitor: &mut Visitor<'_>) -> Result<()> {
     if visitor.budgets(METHOD, &[bytes]).is_empty() {
         return Ok(());
     }
+    visitor.begin();
     (visitor.say)(METHOD);
     let begun = Instant::now();
     let decoder = Uncompressed::new(data)?;
@@ -330,6 +350,17 @@ fn locator<'a>(file: &'a selvedge::Selvedge<'a>, data: &Dataset) -> Locator<'a> 
     Locator { file, size: description.size, lights: description.lights.clone(), views: description.views.clone() }
 }
 
+/// Methods and budgets that were asked for, by their keys: what a page shows.
+pub type Asked = BTreeSet<String>;
+
+/// A short number of a text, for names of files.
+fn short_hash(text: &str) -> u32 {
+    use std::hash::{DefaultHasher, Hash, Hasher};
+    let mut hasher = DefaultHasher::new();
+    text.hash(&mut hasher);
+    hasher.finish() as u32
+}
+
 /// What a dataset is known by in the store: its name, extent and statistics.
 fn identity(data: &Dataset) -> (String, String) {
     let (description, statistics) = (data.description(), data.statistics());
@@ -342,7 +373,7 @@ fn identity(data: &Dataset) -> (String, String) {
 }
 
 /// A name that can be a file's.
-pub fn slug(text: &str) -> String {
+fn slug(text: &str) -> String {
     text.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' }).collect()
 }
 
@@ -351,28 +382,43 @@ pub fn budgets(data: &Dataset, ratios: &[f64]) -> Vec<u64> {
     ratios.iter().map(|ratio| (data.description().half_bytes() as f64 / ratio) as u64).collect()
 }
 
-/// Measures a dataset; what the stores have already is left as it is.
+/// Measures a dataset; what the stores have already is left as it is. Gives the keys of all that was asked for.
 ///
 /// # Errors
 /// If data cannot be read or results not be written.
-pub fn measure(request: &Request, path: &Path, adapter: &Adapter, lines: &mut Store<Line>, held: &mut Store<HeldOut>, say: &dyn Fn(&str)) -> Result<()> {
+pub fn measure(request: &Request, path: &Path, adapter: &Adapter, lines: &mut Store<Line>, held: &mut Store<HeldOut>, say: &dyn Fn(&str)) -> Result<Asked> {
     let data = Dataset::open(path)?;
     let (name, identity) = identity(&data);
     let budgets = budgets(&data, &request.ratios);
     let version = env!("CARGO_PKG_VERSION");
-    let key = |method: &str, budget: u64| format!("{identity} | {method} | {budget} | {} | {:?} | {version}", request.rank, request.every);
+    let cores = rayon::current_num_threads();
+    let key = |method: &str, budget: u64| {
+        format!("{identity} | {method} | {budget} | {} | {:?} | {cores} | {} | {version} {REVISION}", request.rank, request.every, adapter.name)
+    };
+    // Names of files and pictures: readable, and of this dataset alone.
+    let prefix = format!("{}-{:08x}", slug(&name), short_hash(&identity));
+    let all_asked = RefCell::new(Asked::new());
+    let knows_peak = Cell::new(false);
     let pictured = budgets[budgets.len() / 2];
 
-    let known: std::collections::BTreeSet<String> = lines.lines.iter().map(|line| line.key.clone()).collect();
+    let known: BTreeSet<String> = lines.lines.iter().map(|line| line.key.clone()).collect();
     let asked = |method: &str| request.methods.is_empty() || request.methods.iter().any(|m| method.contains(m.as_str()));
-    let wanted = |method: &str, budget: u64| asked(method) && !known.contains(&key(method, budget));
+    let is_wanted = |known: &BTreeSet<String>, method: &str, budget: u64| {
+        let key = key(method, budget);
+        let wanted = asked(method) && !known.contains(&key);
+        if asked(method) {
+            all_asked.borrow_mut().insert(key);
+        }
+        wanted
+    };
+    let wanted = |method: &str, budget: u64| is_wanted(&known, method, budget);
     let finder_bytes = finder(&data)?;
     let finder_file = opened(&finder_bytes)?;
     let finds = locator(&finder_file, &data);
     let bench = Bench::new(&data, &finds, adapter, request.every, &request.out)?;
-    bench.picture(None, &format!("{}-reference", slug(&name)))?;
+    let reference = bench.picture(None, &format!("{prefix}-data"))?;
     let mut visit = |made: Made| -> Result<()> {
-        let peak = peak_memory();
+        let peak = peak_memory().filter(|_| knows_peak.get());
         let opened_file = match &made.what {
             What::File(bytes) => Some(opened(bytes)?),
             What::Baseline(_) => None,
@@ -383,14 +429,17 @@ pub fn measure(request: &Request, path: &Path, adapter: &Adapter, lines: &mut St
             (What::File(_), None) => unreachable!("a file is opened or refused"),
         };
         if let What::File(bytes) = &made.what {
-            files::write(&request.out.join("files").join(format!("{}-{}-{}.selv", slug(&name), slug(&made.method), made.budget)), bytes)?;
+            files::write(&request.out.join("files").join(format!("{prefix}-{}-{}.selv", slug(&made.method), made.budget)), bytes)?;
         }
         let [ssim, flip] = bench.similarity(&subject)?;
         let shown = made.budget == pictured || made.method == "uncompressed";
-        let picture = shown.then(|| bench.picture(Some(&subject), &format!("{}-{}", slug(&name), slug(&made.method)))).transpose()?;
+        let picture = shown.then(|| bench.picture(Some(&subject), &format!("{prefix}-{}-{}", slug(&made.method), made.budget))).transpose()?;
         lines.add(Line {
             key: key(&made.method, made.budget),
             dataset: name.clone(),
+            reference: reference.clone(),
+            adapter: adapter.name.clone(),
+            cores,
             kind: if open_seconds.is_some() { Kind::File } else { Kind::Baseline },
             bytes,
             every: bench.every,
@@ -406,19 +455,16 @@ pub fn measure(request: &Request, path: &Path, adapter: &Adapter, lines: &mut St
             picture,
             method: made.method,
             setting: made.setting,
-        })?;
-        forget_peak();
-        Ok(())
+        })
     };
-    forget_peak();
     let say_name = |text: &str| say(&format!("{name}: {text}"));
-    everything(&data, request.rank, &budgets, &mut Visitor { wanted: &wanted, visit: &mut visit, say: &say_name })?;
+    everything(&data, request.rank, &budgets, &mut Visitor { wanted: &wanted, visit: &mut visit, say: &say_name, knows_peak: &knows_peak })?;
     if request.held_out {
-        let known: std::collections::BTreeSet<String> = held.lines.iter().map(|line| line.key.clone()).collect();
-        let wanted = |method: &str, budget: u64| asked(method) && !known.contains(&key(method, budget));
+        let known: BTreeSet<String> = held.lines.iter().map(|line| line.key.clone()).collect();
+        let wanted = |method: &str, budget: u64| is_wanted(&known, method, budget);
         hold_out(request, &data, &name, pictured, bench.every, &wanted, &key, held, &say_name)?;
     }
-    Ok(())
+    Ok(all_asked.into_inner())
 }
 
 /// The middle budget again, on data without some directions, measured at those.
@@ -470,13 +516,13 @@ fn hold_out(
                 Some(data.statistics().largest as f64),
                 &|_, _| (),
             )?;
-            Ok(Metrics { psnr_db: found.psnr_db.min(999.0), ..found })
+            Ok(Metrics { psnr_db: found.psnr_db.clamp(-999.0, 999.0), ..found })
         };
         let of_seen = of(&seen, every)?;
         held.add(HeldOut { key: key(&made.method, made.budget), dataset: name.to_owned(), method: made.method, bytes, seen: of_seen, unseen: of(&unseen, 1)? })
     };
     let say = |text: &str| say(&format!("{} lights and {} views held out: {text}", held_lights.len(), held_views.len()));
-    everything(&seen, request.rank, &[budget], &mut Visitor { wanted: &wanted, visit: &mut visit, say: &say })
+    everything(&seen, request.rank, &[budget], &mut Visitor { wanted: &wanted, visit: &mut visit, say: &say, knows_peak: &Cell::new(false) })
 }
 
 /// Progress on a terminal, a line each elsewhere.

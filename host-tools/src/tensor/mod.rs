@@ -120,7 +120,7 @@ impl Correlations {
     /// Codes every texel with what each coefficient is worth, and rounds.
     fn lists(&self, gram: &[f64], quantiser: &Quantiser, pursuit: Pursuit) -> Lists {
         let n = quantiser.atoms();
-        let of = |texel: usize| {
+        let coded = |texel: usize, pursuit: Pursuit| {
             let alpha = &self.alpha[texel * n..][..n];
             let code = pursue(alpha, self.energy[texel], gram, pursuit);
             let mut limited = 0;
@@ -138,6 +138,23 @@ impl Correlations {
                 error += rounded.iter().map(|&(b, y)| x * y * gram[a * n + b]).sum::<f64>();
             }
             (list, error.max(0.0), limited)
+        };
+        let of = |texel: usize| {
+            let mut best = coded(texel, pursuit);
+            // Nearly parallel atoms get large coefficients that cancel; where these are limited they do not, and fewer come nearer.
+            if best.2 > 0 {
+                for most in (0..best.0.len()).rev() {
+                    let shorter = coded(texel, Pursuit { most, ..pursuit });
+                    let is_whole = shorter.2 == 0;
+                    if shorter.1 < best.1 {
+                        best = shorter;
+                    }
+                    if is_whole {
+                        break;
+                    }
+                }
+            }
+            if best.1 > self.energy[texel] { (Vec::new(), self.energy[texel], 0) } else { best }
         };
         let all: Vec<_> = (0..self.energy.len()).into_par_iter().map(of).collect();
         let mut lists = Lists { model: Vec::with_capacity(all.len()), error: 0.0, count: 0, limited: 0 };
