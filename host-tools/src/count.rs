@@ -3,6 +3,7 @@
 //! The walk uses the core's own parts and follows the plain path step by step; it gives the values too, so that a walk which strays
 //! from the decoder is found out. Prices are those of the steps that are taken, where the file states those of the worst sample.
 
+use crate::read::RecordTables;
 use selvedge::direction::{clamp_direction, coarse_q14, cross, grid_cell, grid_start, point, triangles_start};
 use selvedge::ensemble::{RECORD_BOUND, Record, blend_column, blend_span, coefficients_start, dequantise, read_record};
 use selvedge::fixed::{clamp_magnitude, multiply_q15, round_shift};
@@ -157,13 +158,7 @@ pub fn locate(material: &Selvedge<'_>, start: u32, direction: Direction) -> u64 
 #[allow(clippy::too_many_arguments, reason = "those of its twin in the core, and the count")]
 fn walk_record(material: &Selvedge<'_>, channel: Channel, record: Record, x: Span, y: Span, light: Taps, view: Taps, operations: &mut u64) -> i32 {
     let words = material.words();
-    let table = |section: u32, second: u32| {
-        let entry = section + 2 + record.dictionary * 4 + second;
-        (section + word(words, entry + 2), word(words, entry).div_ceil(2))
-    };
-    let (light_table, view_table) = (table(channel.angular_start, 0), table(channel.angular_start, 1));
-    let (x_table, y_table) = (table(channel.spatial_start, 0), table(channel.spatial_start, 1));
-    let atoms = channel.atoms_start + word(words, channel.atoms_start + 3 + record.dictionary * 2);
+    let RecordTables { light: light_table, view: view_table, x: x_table, y: y_table, atoms } = RecordTables::of(words, channel, record.dictionary);
     let field_bits = record.low_bits + record.value_bits;
     let (mut total, mut sum_y, mut sum_xy) = (0i32, 0i32, 0i32);
     let (mut at_x, mut at_y) = (0, 0);

@@ -3,7 +3,7 @@
 //! Results are the core's, bit for bit. What a single coefficient gives is told in floats, since the decoder rounds sums and not
 //! single terms; `rounding` is the difference.
 
-use crate::read::{list, record_coefficients};
+use crate::read::{RecordTables, list, record_coefficients};
 use selvedge::direction::{Direction, Taps};
 use selvedge::ensemble::{blend_column, blend_span, coefficients_start, dequantise, read_record, record_q20};
 use selvedge::interpolation::{channel_q20, mean_q20, radiance, scale_q15, texel_values};
@@ -182,13 +182,7 @@ fn record_report(opened: &Selvedge<'_>, channel: Channel, layer: u32, x: Axis, y
     if record.count == 0 {
         return None;
     }
-    let table = |section: u32, second: u32| {
-        let entry = section + 2 + record.dictionary * 4 + second;
-        (section + word(words, entry + 2), word(words, entry).div_ceil(2))
-    };
-    let (light_table, view_table) = (table(channel.angular_start, 0), table(channel.angular_start, 1));
-    let (x_table, y_table) = (table(channel.spatial_start, 0), table(channel.spatial_start, 1));
-    let atoms = channel.atoms_start + word(words, channel.atoms_start + 3 + record.dictionary * 2);
+    let RecordTables { light: light_table, view: view_table, x: x_table, y: y_table, atoms } = RecordTables::of(words, channel, record.dictionary);
     let mut terms = Vec::new();
     record_coefficients(words, record, |position, value| {
         let (atom, quantiser) = (word(words, atoms + position * 2), word(words, atoms + position * 2 + 1));

@@ -83,14 +83,20 @@ pub fn query(direction: glam::DVec3) -> Direction {
     Direction { x_q18: x << 4, y_q18: y << 4, z_q15: cosine_of(x, y) as i32 }
 }
 
+/// The unit vector of a direction: the inverse of the projection x / (1 + z).
+pub fn vector(direction: Direction) -> glam::DVec3 {
+    let p = glam::DVec2::new(direction.x_q18 as f64, direction.y_q18 as f64) / 262_144.0;
+    let scale = 1.0 + p.length_squared();
+    glam::DVec3::new(2.0 * p.x / scale, 2.0 * p.y / scale, (1.0 - p.length_squared()) / scale)
+}
+
 /// What a file says of itself, as a reference: its size and the directions of its points.
 pub fn describe(file: &Selvedge<'_>) -> Description {
     let header = file.header();
-    // The inverse of the projection x / (1 + z).
+    // Points of the disc's border may be rounded beyond it.
     let vector = |d: Direction| {
-        let p = glam::DVec2::new(d.x_q18 as f64, d.y_q18 as f64) / 262_144.0;
-        let scale = 1.0 + p.length_squared();
-        glam::DVec3::new(2.0 * p.x / scale, 2.0 * p.y / scale, ((1.0 - p.length_squared()) / scale).max(0.0))
+        let v = vector(d);
+        glam::DVec3::new(v.x, v.y, v.z.max(0.0))
     };
     Description {
         size: file.image_size(0).map(|n| n as usize),

@@ -218,6 +218,32 @@ fn record(words: Words<'_>, record: Record) -> RecordModel {
     RecordModel { dictionary: record.dictionary, shift: record.shift, coefficients }
 }
 
+/// Where the tables of a channel's dictionary are: first word and words of a row (10.1-3, 10.2-1); and its atoms.
+pub(crate) struct RecordTables {
+    pub light: (u32, u32),
+    pub view: (u32, u32),
+    pub x: (u32, u32),
+    pub y: (u32, u32),
+    pub atoms: u32,
+}
+
+impl RecordTables {
+    /// Of a dictionary by its number.
+    pub fn of(words: Words<'_>, channel: Channel, dictionary: u32) -> RecordTables {
+        let table = |section: u32, second: u32| {
+            let entry = section + 2 + dictionary * 4 + second;
+            (section + word(words, entry + 2), word(words, entry).div_ceil(2))
+        };
+        RecordTables {
+            light: table(channel.angular_start, 0),
+            view: table(channel.angular_start, 1),
+            x: table(channel.spatial_start, 0),
+            y: table(channel.spatial_start, 1),
+            atoms: channel.atoms_start + word(words, channel.atoms_start + 3 + dictionary * 2),
+        }
+    }
+}
+
 /// Position and value of each coefficient of a record that has some.
 pub(crate) fn record_coefficients(words: Words<'_>, record: Record, mut each: impl FnMut(u32, u32)) {
     let field_bits = record.low_bits + record.value_bits;

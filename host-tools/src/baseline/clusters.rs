@@ -6,7 +6,7 @@
 //! or 16 bits with a scale for each component of a cluster, and everything is counted.
 
 use super::Row;
-use super::decoder::{At, Blend, Decoder, add_row};
+use super::decoder::{At, Blend, Decoder, Pairs, add_row};
 use super::pca::{Domain, Pca, decode_and_compare, quantised};
 use crate::dataset::Dataset;
 use crate::error::Result;
@@ -223,8 +223,7 @@ impl Decoder for Decoded {
         let (texels, n) = (out.len() / lights.len(), self.components);
         let mut blended = vec![[0.0f32; 3]; self.clusters * (n + 1)];
         for (&light, out) in lights.iter().zip(out.chunks_mut(texels)) {
-            let at = At { x: [(0, 1.0); 2], y: [(0, 1.0); 2], light, view };
-            let pairs = at.pairs(self.lights);
+            let pairs = Pairs::of(light, view, self.lights);
             for (i, sum) in blended.iter_mut().enumerate() {
                 *sum = [0.0; 3];
                 pairs.iter().for_each(|&(pair, weight)| add_row(sum, weight, &self.row(i / (n + 1), i % (n + 1), pair)));

@@ -1,6 +1,6 @@
 //! The data themselves in binary16, interpolated between nine pairs of directions and four texels: nothing is lost, and nothing is saved.
 
-use super::decoder::{At, Blend, Decoder};
+use super::decoder::{At, Blend, Decoder, Pairs};
 use crate::dataset::Dataset;
 use crate::error::Result;
 use half::f16;
@@ -50,9 +50,8 @@ impl Decoder for Uncompressed {
     fn images(&self, lights: &[Blend], view: Blend, out: &mut [[f32; 3]]) {
         let texels = out.len() / lights.len();
         for (i, rgb) in out.iter_mut().enumerate() {
-            let at = At { x: [(0, 1.0); 2], y: [(0, 1.0); 2], light: lights[i / texels], view };
             *rgb = [0.0; 3];
-            for &(pair, weight) in at.pairs(self.lights).iter() {
+            for &(pair, weight) in Pairs::of(lights[i / texels], view, self.lights).iter() {
                 let found = self.rgb(i % texels, pair);
                 (0..3).for_each(|c| rgb[c] += weight * found[c]);
             }

@@ -3,6 +3,9 @@
 //! Every baseline becomes a [`Decoder`], made of what it would store, and is then timed and compared like a file. A filtered sample is
 //! between four texels, three lights and three views, and each decoder takes it in the order that costs least for its own layout.
 
+use super::pca::{Domain, Pca};
+use crate::linear::product_bt;
+use crate::measure::vector;
 use selvedge::position::axis_at_position;
 use selvedge::{Direction, FilteredQuery, Selvedge, Taps};
 
@@ -75,14 +78,7 @@ impl At {
     /// Up to nine pairs of directions as `view * lights + light`, and their weights.
     #[inline(always)]
     pub fn pairs(&self, lights: usize) -> Pairs {
-        let mut pairs = Pairs { pairs: [(0, 0.0); 9], count: 0 };
-        for (v, weight_v) in self.view.parts() {
-            for (l, weight_l) in self.light.parts() {
-                pairs.pairs[pairs.count] = (v * lights + l, weight_v * weight_l);
-                pairs.count += 1;
-            }
-        }
-        pairs
+        Pairs::of(self.light, self.view, lights)
     }
 }
 
@@ -91,6 +87,21 @@ impl At {
 pub struct Pairs {
     pairs: [(usize, f32); 9],
     count: usize,
+}
+
+impl Pairs {
+    /// Of some lights and views, where the set has `lights` lights.
+    #[inline(always)]
+    pub fn of(light: Blend, view: Blend, lights: usize) -> Pairs {
+        let mut pairs = Pairs { pairs: [(0, 0.0); 9], count: 0 };
+        for (v, weight_v) in view.parts() {
+            for (l, weight_l) in light.parts() {
+                pairs.pairs[pairs.count] = (v * lights + l, weight_v * weight_l);
+                pairs.count += 1;
+            }
+        }
+        pairs
+    }
 }
 
 impl std::ops::Deref for Pairs {
@@ -146,13 +157,6 @@ impl Locator<'_> {
     }
 }
 
-/// The unit vector of a direction in fixed point.
-pub fn vector(direction: Direction) -> glam::DVec3 {
-    let p = glam::DVec2::new(direction.x_q18 as f64, direction.y_q18 as f64) / 262_144.0;
-    let scale = 1.0 + p.length_squared();
-    glam::DVec3::new(2.0 * p.x / scale, 2.0 * p.y / scale, (1.0 - p.length_squared()) / scale)
-}
-
 /// A baseline, decoded from what it would store.
 pub trait Decoder: Sync + Send {
     /// Bytes that it would store.
@@ -178,6 +182,62 @@ pub const EXPONENTIAL: u64 = 7;
 
 /// Multiplications of a sample's position and weights of directions, which files and baselines share; the rest of finding directions is compared apart.
 pub const POSITION: u64 = 18;
+
+/// What decompositions share: the mean of each pair, and how their values become radiance.
+pub(crate) struct Frame {
+    /// `[view][light][colour]`.
+    pub mean: Vec<f32>,
+    /// What is decomposed.
+    pub domain: Domain,
+    /// Offset of the logarithm.
+    pub offset: f32,
+    /// Texels of a row.
+    pub width: usize,
+    /// Lights of the set.
+    pub lights: usize,
+}
+
+impl Frame {
+    /// Of the components' dataset, with a mean as it is decoded.
+    pub fn new(pca: &Pca<'_>, mean: Vec<f32>) -> Frame {
+        let description = pca.dataset.description();
+        let (width, lights) = (description.size[0], description.lights.len());
+        Frame { mean, domain: pca.domain, offset: pca.dataset.statistics().log_offset(), width, lights }
+    }
+
+    /// Radiance of values.
+    #[inline(always)]
+    pub fn back(&self, values: [f32; 3]) -> [f32; 3] {
+        values.map(|y| self.domain.back(y, self.offset))
+    }
+
+    /// The mean of a sample.
+    #[inline(always)]
+    pub fn mean_at(&self, at: &At) -> [f32; 3] {
+        let mut sum = [0.0f32; 3];
+        at.pairs(self.lights).iter().for_each(|&(pair, weight)| add_row(&mut sum, weight, &self.mean[pair * 3..][..3]));
+        sum
+    }
+
+    /// Images of the mean and of products: `rows` are `[light][colour][column]`, `texels` are `[texel][column]`.
+    pub fn images(&self, lights: &[Blend], view: Blend, rows: &[f32], texels: &[f32], columns: usize, out: &mut [[f32; 3]]) {
+        let count = out.len() / lights.len();
+        let mut values = vec![0.0f32; lights.len() * 3 * count];
+        for (&light, values) in lights.iter().zip(values.chunks_mut(3 * count)) {
+            for &(pair, weight) in Pairs::of(light, view, self.lights).iter() {
+                for (values, mean) in values.chunks_mut(count).zip(&self.mean[pair * 3..][..3]) {
+                    values.iter_mut().for_each(|v| *v += weight * mean);
+                }
+            }
+        }
+        if columns > 0 {
+            product_bt(&mut values, rows, texels, [lights.len() * 3, columns, count], true);
+        }
+        for (i, rgb) in out.iter_mut().enumerate() {
+            *rgb = self.back(std::array::from_fn(|c| values[(i / count * 3 + c) * count + i % count]));
+        }
+    }
+}
 
 /// `sum += weight * row`, side by side.
 #[inline(always)]

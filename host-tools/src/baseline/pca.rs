@@ -5,7 +5,7 @@
 //! so that the matrix is never held. Both factors and the mean are quantised to 8 or 16 bits, a scale for each component
 //! and factor, and everything is counted. Singular values are in the factor over texels.
 
-use super::decoder::{At, Blend, Decoder, EXPONENTIAL, add_row, dot};
+use super::decoder::{At, Blend, Decoder, EXPONENTIAL, Frame, Pairs, add_row, dot};
 use super::{Row, Sums};
 use crate::dataset::Dataset;
 use crate::error::Result;
@@ -86,14 +86,10 @@ pub struct Choice {
 
 /// Components decoded from what they store.
 pub struct Decoded {
-    mean: Vec<f32>,
+    frame: Frame,
     of_texels: Vec<f32>,
     of_pairs: Vec<f32>,
     rank: usize,
-    domain: Domain,
-    offset: f32,
-    width: usize,
-    lights: usize,
     bytes: u64,
 }
 
@@ -103,55 +99,41 @@ impl Decoder for Decoded {
     }
 
     fn images(&self, lights: &[Blend], view: Blend, out: &mut [[f32; 3]]) {
-        let (rank, texels) = (self.rank, out.len() / lights.len());
+        let rank = self.rank;
         let mut rows = vec![0.0f32; lights.len() * 3 * rank];
-        let mut values = vec![0.0f32; lights.len() * 3 * texels];
         for (i, &light) in lights.iter().enumerate() {
-            let at = At { x: [(0, 1.0); 2], y: [(0, 1.0); 2], light, view };
-            for &(pair, weight) in at.pairs(self.lights).iter() {
+            for &(pair, weight) in Pairs::of(light, view, self.frame.lights).iter() {
                 add_row(&mut rows[i * 3 * rank..][..3 * rank], weight, &self.of_pairs[pair * 3 * rank..][..3 * rank]);
-                for c in 0..3 {
-                    let mean = weight * self.mean[pair * 3 + c];
-                    values[(i * 3 + c) * texels..][..texels].iter_mut().for_each(|v| *v += mean);
-                }
             }
         }
-        if rank > 0 {
-            product_bt(&mut values, &rows, &self.of_texels, [lights.len() * 3, rank, texels], true);
-        }
-        for (i, rgb) in out.iter_mut().enumerate() {
-            *rgb = std::array::from_fn(|c| self.domain.back(values[(i / texels * 3 + c) * texels + i % texels], self.offset));
-        }
+        self.frame.images(lights, view, &rows, &self.of_texels, rank, out);
     }
 
     fn filtered(&self, at: &At) -> [f32; 3] {
         // The four texels' weights first, so that every pair and colour meets one row of them.
         const MOST: usize = 512;
         let mut blended = [0.0f32; MOST];
-        let mut sum = [0.0f32; 3];
-        let texels = at.texels(self.width);
-        for &(pair, weight) in at.pairs(self.lights).iter() {
-            (0..3).for_each(|c| sum[c] += weight * self.mean[pair * 3 + c]);
-        }
+        let mut sum = self.frame.mean_at(at);
+        let (texels, pairs) = (at.texels(self.frame.width), at.pairs(self.frame.lights));
         let mut first = 0;
         while first < self.rank {
             let part = (self.rank - first).min(MOST);
             let blended = &mut blended[..part];
             blended.fill(0.0);
             texels.iter().for_each(|&(texel, weight)| add_row(blended, weight, &self.of_texels[texel * self.rank + first..][..part]));
-            for &(pair, weight) in at.pairs(self.lights).iter() {
+            for &(pair, weight) in pairs.iter() {
                 for (c, sum) in sum.iter_mut().enumerate() {
                     *sum += weight * dot(blended, &self.of_pairs[(pair * 3 + c) * self.rank + first..][..part]);
                 }
             }
             first += part;
         }
-        sum.map(|y| self.domain.back(y, self.offset))
+        self.frame.back(sum)
     }
 
     fn operations(&self, at: &At) -> u64 {
-        let (pairs, rank) = (at.pairs(self.lights).len() as u64, self.rank as u64);
-        4 * rank + pairs * (3 * rank + 7) + self.domain.operations()
+        let (pairs, rank) = (at.pairs(self.frame.lights).len() as u64, self.rank as u64);
+        4 * rank + pairs * (3 * rank + 7) + self.frame.domain.operations()
     }
 }
 
@@ -304,7 +286,7 @@ impl Pca<'_> {
             return Ok(*row);
         }
         let columns = self.mean.len();
-        let Decoded { mean, of_texels, of_pairs, offset, .. } = self.decoder(rank, bits);
+        let Decoded { frame: Frame { mean, offset, .. }, of_texels, of_pairs, .. } = self.decoder(rank, bits);
         let work = |first: usize, values: &[f32]| {
             LOGS.with_borrow_mut(|logs| {
                 logs.resize(values.len(), 0.0);
@@ -330,16 +312,11 @@ impl Pca<'_> {
         let least = self.mean.iter().copied().fold(f32::MAX, f32::min);
         let largest = self.mean.iter().copied().fold(f32::MIN, f32::max);
         let scale = (largest - least).max(1e-30) / ((1u32 << bits) - 1) as f32;
-        let description = self.dataset.description();
         Decoded {
-            mean: self.mean.iter().map(|m| least + ((m - least) / scale).round() * scale).collect(),
+            frame: Frame::new(self, self.mean.iter().map(|m| least + ((m - least) / scale).round() * scale).collect()),
             of_texels: quantised(&self.of_texels, self.rank, rank, bits),
             of_pairs: quantised(&self.of_pairs, self.rank, rank, bits),
             rank,
-            domain: self.domain,
-            offset: self.dataset.statistics().log_offset(),
-            width: description.size[0],
-            lights: description.lights.len(),
             bytes: self.bytes(rank, bits),
         }
     }

@@ -7,7 +7,7 @@
 //! dictionary a channel), although the published ones were trained on other materials. Ensembles are an argument, and their
 //! bytes are told apart.
 
-use super::decoder::{At, Blend, Decoder, EXPONENTIAL, add_row};
+use super::decoder::{At, Blend, Decoder, EXPONENTIAL, Pairs, add_row};
 use super::{Row, Sums};
 use crate::dataset::Dataset;
 use crate::dictionary::{self, Ensemble, Turn};
@@ -437,8 +437,8 @@ impl Decoded {
         term.value * sum
     }
 
-    fn mean(&self, at: &At) -> f32 {
-        at.pairs(self.lights).iter().map(|&(pair, weight)| weight * self.means[pair]).sum()
+    fn mean(&self, light: Blend, view: Blend) -> f32 {
+        Pairs::of(light, view, self.lights).iter().map(|&(pair, weight)| weight * self.means[pair]).sum()
     }
 
     fn back(yuv: [f32; 3]) -> [f32; 3] {
@@ -455,7 +455,7 @@ impl Decoder for Decoded {
         let [width, height] = self.size;
         let across = width.div_ceil(EDGE);
         for (&light, out) in lights.iter().zip(out.chunks_mut(width * height)) {
-            let mean = self.mean(&At { x: [(0, 1.0); 2], y: [(0, 1.0); 2], light, view });
+            let mean = self.mean(light, view);
             for block in 0..self.ends.len() / 3 {
                 let (left, top) = (block % across * EDGE, block / across * EDGE);
                 let mut planes = [[mean; EDGE * EDGE]; 3];
@@ -484,7 +484,7 @@ impl Decoder for Decoded {
 
     fn filtered(&self, at: &At) -> [f32; 3] {
         let across = self.size[0].div_ceil(EDGE);
-        let mut yuv = [self.mean(at); 3];
+        let mut yuv = [self.mean(at.light, at.view); 3];
         // Blocks between which the sample is, each with the blended rows of its texels.
         for (block_y, part_y) in parts_of(at.y) {
             for (block_x, part_x) in parts_of(at.x) {

@@ -5,8 +5,8 @@
 //! core by them beforehand, which takes four times the memory and is what [`Decoded`] does.
 
 use super::Row;
-use super::decoder::{At, Blend, Decoder, add_row, dot};
-use super::pca::{Domain, Pca, decode_and_compare, pass, quantised};
+use super::decoder::{At, Blend, Decoder, Frame, add_row, dot};
+use super::pca::{Pca, decode_and_compare, pass, quantised};
 use crate::error::Result;
 use crate::linear::{Basis, eigenbasis, product, product_at, product_bt};
 
@@ -124,19 +124,7 @@ impl Tucker<'_, '_> {
         for row in 0..height {
             product(&mut texels[row * width * angular..][..width * angular], &x, &by_y[row * kx * angular..][..kx * angular], [width, kx, angular], false);
         }
-        Decoded {
-            mean: self.pca.mean.clone(),
-            texels,
-            view,
-            light,
-            views,
-            lights,
-            light_count: description.lights.len(),
-            domain: self.pca.domain,
-            offset: self.pca.dataset.statistics().log_offset(),
-            width,
-            bytes: self.bytes(views, lights, bits),
-        }
+        Decoded { frame: Frame::new(self.pca, self.pca.mean.clone()), texels, view, light, views, lights, bytes: self.bytes(views, lights, bits) }
     }
 
     /// Errors over all values, decoded from quantised factors.
@@ -144,12 +132,12 @@ impl Tucker<'_, '_> {
     /// # Errors
     /// If the data cannot be read.
     pub fn measure(&self, views: usize, lights: usize, bits: u32) -> Result<Row> {
-        let Decoded { mean, texels, view, light, views, lights, light_count, bytes, .. } = self.decoder(views, lights, bits);
-        let (view_count, light_len) = (view.len() / views, light_count * 3);
+        let Decoded { frame, texels, view, light, views, lights, bytes } = self.decoder(views, lights, bits);
+        let (view_count, light_len) = (view.len() / views, frame.lights * 3);
         let decode = |texel: usize, out: &mut [f32]| {
             let mut by_view = vec![0.0; view_count * lights];
             product(&mut by_view, &view, &texels[texel * views * lights..][..views * lights], [view_count, views, lights], false);
-            out.copy_from_slice(&mean);
+            out.copy_from_slice(&frame.mean);
             product_bt(out, &by_view, &light, [view_count, lights, light_len], true);
         };
         decode_and_compare(self.pca, bytes, &decode)
@@ -158,7 +146,7 @@ impl Tucker<'_, '_> {
 
 /// The decomposition decoded from what it stores, the spatial modes multiplied beforehand.
 pub struct Decoded {
-    mean: Vec<f32>,
+    frame: Frame,
     /// `[texel][view column][light column]`.
     texels: Vec<f32>,
     /// `[view][column]`.
@@ -167,10 +155,6 @@ pub struct Decoded {
     light: Vec<f32>,
     views: usize,
     lights: usize,
-    light_count: usize,
-    domain: Domain,
-    offset: f32,
-    width: usize,
     bytes: u64,
 }
 
@@ -197,18 +181,8 @@ impl Decoder for Decoded {
             row.iter().zip(core.chunks(l)).for_each(|(&weight, core)| add_row(out, weight, core));
         }
         let mut rows = vec![0.0; lights.len() * 3 * l];
-        let mut values = vec![0.0f32; lights.len() * 3 * texels];
-        for (i, &light) in lights.iter().enumerate() {
-            Decoded::blended(&self.light, 3 * l, light, &mut rows[i * 3 * l..][..3 * l]);
-            let at = At { x: [(0, 1.0); 2], y: [(0, 1.0); 2], light, view };
-            for &(pair, weight) in at.pairs(self.light_count).iter() {
-                (0..3).for_each(|c| values[(i * 3 + c) * texels..][..texels].iter_mut().for_each(|x| *x += weight * self.mean[pair * 3 + c]));
-            }
-        }
-        product_bt(&mut values, &rows, &by_view, [lights.len() * 3, l, texels], true);
-        for (i, rgb) in out.iter_mut().enumerate() {
-            *rgb = std::array::from_fn(|c| self.domain.back(values[(i / texels * 3 + c) * texels + i % texels], self.offset));
-        }
+        lights.iter().zip(rows.chunks_mut(3 * l)).for_each(|(&light, rows)| Decoded::blended(&self.light, 3 * l, light, rows));
+        self.frame.images(lights, view, &rows, &by_view, l, out);
     }
 
     fn filtered(&self, at: &At) -> [f32; 3] {
@@ -216,27 +190,26 @@ impl Decoder for Decoded {
         let (v, l) = (self.views, self.lights);
         let (mut row, mut by_view, mut lights) = ([0.0f32; MOST], [0.0f32; MOST], [0.0f32; 3 * MOST]);
         Decoded::blended(&self.view, v, at.view, &mut row[..v]);
-        for (texel, weight) in at.texels(self.width) {
+        for (texel, weight) in at.texels(self.frame.width) {
             let core = &self.texels[texel * v * self.lights..][..v * self.lights];
             row.iter().zip(core.chunks(self.lights)).for_each(|(&of_view, core)| add_row(&mut by_view[..l], weight * of_view, core));
         }
         Decoded::blended(&self.light, 3 * self.lights, at.light, &mut lights[..3 * l]);
-        let mut sum: [f32; 3] = std::array::from_fn(|c| dot(&by_view[..l], &lights[c * l..][..l]));
-        at.pairs(self.light_count).iter().for_each(|&(pair, weight)| (0..3).for_each(|c| sum[c] += weight * self.mean[pair * 3 + c]));
-        sum.map(|y| self.domain.back(y, self.offset))
+        let mean = self.frame.mean_at(at);
+        self.frame.back(std::array::from_fn(|c| mean[c] + dot(&by_view[..l], &lights[c * l..][..l])))
     }
 
     fn operations(&self, at: &At) -> u64 {
         let (v, l) = (self.views as u64, self.lights as u64);
         let (of_views, of_lights) = (at.view.parts().count() as u64, at.light.parts().count() as u64);
-        of_views * v + 4 * (v + v * l) + of_lights * 3 * l + 3 * l + of_views * of_lights * 4 + self.domain.operations()
+        of_views * v + 4 * (v + v * l) + of_lights * 3 * l + 3 * l + of_views * of_lights * 4 + self.frame.domain.operations()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::baseline::pca::pca;
+    use crate::baseline::pca::{Domain, pca};
     use crate::baseline::tests::small;
 
     #[test]

@@ -6,15 +6,14 @@ use crate::baseline::pca;
 use crate::dataset::{Dataset, Description};
 use crate::dictionary::Ensemble;
 use crate::dictionary_file;
-use crate::encode::driver::{EDGES, Event, Verified, Wish, encode_verified};
+use crate::encode::driver::{EDGES, Event, Verified, Wish, encode_verified, verify};
 use crate::encode::{Options, Prepared, prepare};
 use crate::error::{Result, ToolError};
-use crate::measure::{self, Metrics};
+use crate::measure::Metrics;
 use crate::model::TransferModel;
 use crate::progress::Progress;
 use crate::{files, pyramid, tensor, train};
 use clap::{Args, ValueEnum};
-use selvedge::Limits;
 use std::path::PathBuf;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, serde::Serialize)]
@@ -338,7 +337,7 @@ fn by_tensor(args: &EncodeArgs, data: &Dataset, coarser: &[Dataset], transfer: D
     let (encoded, operations, metrics) = loop {
         let options = tensor::Options { shape, goal, value_bits: args.value_bits.map(|bits| bits[0]), training };
         let encoded = tensor::encode_fit(&components, &fitted, &coarser, &options)?;
-        let (operations, metrics) = verify(&encoded.bytes, data, progress)?;
+        let (metrics, operations) = verify(data, &encoded.bytes, None, 1, &|done, all| tell("verifying", done, all))?;
         let found = if transfer == Domain::Log { metrics.log_rms } else { metrics.linear_rms };
         if found <= most {
             break (encoded, operations, metrics);
@@ -369,16 +368,6 @@ fn by_tensor(args: &EncodeArgs, data: &Dataset, coarser: &[Dataset], transfer: D
         tried: Vec::new(),
     };
     Ok(Attempt { bytes: encoded.bytes, told })
-}
-
-/// Decodes a file at every texel and pair of its data: the operations that it states, and its errors.
-fn verify(bytes: &[u8], data: &Dataset, progress: &Progress) -> Result<(u32, Metrics)> {
-    let file = selvedge::open(bytes, &Limits::NONE);
-    let file = file.map_err(|finding| ToolError::Mismatch(format!("the encoder wrote a file that breaks a rule: {finding}")))?;
-    let (offset, peak) = (data.statistics().log_offset(), Some(data.statistics().largest as f64));
-    let tell = |done, all| progress.tell("verifying", done, all);
-    let metrics = measure::compare(measure::Source::Data(data), measure::Source::File(&file, 0), data.description(), offset, peak, &tell)?;
-    Ok((file.header().operations, metrics))
 }
 
 /// One file for each edge; an edge of zero lets the driver choose.

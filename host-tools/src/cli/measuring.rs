@@ -6,7 +6,7 @@ use crate::error::{Result, ToolError};
 use crate::report::page::{Page, write_stability};
 use crate::report::{Operations, Request, Store, sweep};
 use crate::speed::{self, Adapter, Rate, Speed};
-use crate::{count, files, stability};
+use crate::{files, stability};
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
 
@@ -105,16 +105,11 @@ fn bench(args: &BenchArgs) -> Result<u8> {
         let bytes = files::read(path)?;
         let file = selvedge::open_with(&bytes, dictionary.as_deref(), &args.limits.limits());
         let file = file.map_err(|finding| ToolError::Invalid { path: path.clone(), finding })?;
-        let counts: Vec<u64> = speed::random_queries(2000).iter().map(|q| count::filtered(&file, 0, q.u_q32, q.v_q32, q.light, q.view).operations).collect();
         all.push(Measured {
             file: path.clone(),
             bytes: bytes.len(),
             open_seconds: speed::open_seconds(&bytes, dictionary.as_deref()),
-            operations: Operations {
-                mean: counts.iter().sum::<u64>() as f64 / counts.len() as f64,
-                largest: counts.into_iter().max().unwrap_or(0),
-                stated: Some(file.header().operations),
-            },
+            operations: Operations::of_file(&file),
             speed: speed::of_file(&file, &adapter),
             adapter: adapter.name.clone(),
             cores: rayon::current_num_threads(),

@@ -4,11 +4,12 @@
 //! pair of directions, and encodes again until the goal holds in the domain that was asked for.
 
 use super::{Encoded, Goal, Options, Prepared, encode};
+use crate::dataset::Dataset;
 use crate::dictionary::Ensemble;
 use crate::error::{Result, ToolError};
 use crate::measure::{Metrics, Source, compare_every};
 use crate::model::TransferModel;
-use selvedge::Limits;
+use selvedge::{Limits, Selvedge};
 
 /// An error to be met, as decoded.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -98,10 +99,11 @@ fn measured(wish: Wish, metrics: &Metrics) -> Option<(f64, f64)> {
 
 fn meet(prepared: &Prepared<'_>, ensembles: &[Ensemble; 3], wish: Wish, options: &Options, tell: &(dyn Fn(Event<'_>) + Sync)) -> Result<Verified> {
     let edge = options.edge;
+    let verifying = |done, all| tell(Event::Pass("verifying", done, all));
     let attempt = |goal: Goal, sampled: bool| -> Result<(Verified, bool)> {
         let encoded = encode(prepared, ensembles, &Options { goal, ..options.clone() }, &|done, all| tell(Event::Pass("projecting", done, all)))?;
         let every = if sampled { sampling(prepared, &encoded) } else { 1 };
-        let (metrics, operations) = verify(prepared, &encoded, every, options, tell)?;
+        let (metrics, operations) = verify(prepared.levels[0], &encoded.bytes, options.external.as_deref(), every, &verifying)?;
         tell(Event::Attempt(edge, &encoded, &metrics));
         Ok((Verified { encoded, edge, metrics, operations }, every > 1))
     };
@@ -132,7 +134,7 @@ fn meet(prepared: &Prepared<'_>, ensembles: &[Ensemble; 3], wish: Wish, options:
         let worth_it = best.as_ref().is_none_or(|best| verified.encoded.bytes.len() < best.encoded.bytes.len());
         // A sample can only refuse: what is kept was decoded as a whole.
         if sampled && found <= most && worth_it {
-            (verified.metrics, verified.operations) = verify(prepared, &verified.encoded, 1, options, tell)?;
+            (verified.metrics, verified.operations) = verify(prepared.levels[0], &verified.encoded.bytes, options.external.as_deref(), 1, &verifying)?;
             found = measured(wish, &verified.metrics).map_or(found, |(found, _)| found);
         }
         let (reached, near) = (found <= most, found > most * 0.97);
@@ -160,14 +162,22 @@ fn sampling(prepared: &Prepared<'_>, encoded: &Encoded) -> usize {
     (coefficients as u64 * prepared.levels[0].description().pairs() as u64 / TRIAL).clamp(1, 16) as usize
 }
 
-/// Decodes a file at every texel of level 0 and every so many-th light.
-fn verify(prepared: &Prepared<'_>, encoded: &Encoded, every: usize, options: &Options, tell: &(dyn Fn(Event<'_>) + Sync)) -> Result<(Metrics, u32)> {
-    let opened = selvedge::open_with(&encoded.bytes, options.external.as_deref(), &Limits::NONE);
-    let file = opened.map_err(|finding| ToolError::Mismatch(format!("the encoder wrote a file that breaks a rule: {finding}")))?;
-    let data = prepared.levels[0];
-    let offset = data.statistics().log_offset();
-    let progress = |done, all| tell(Event::Pass("verifying", done, all));
-    let peak = Some(data.statistics().largest as f64);
-    let metrics = compare_every(every, Source::Data(data), Source::File(&file, 0), data.description(), offset, peak, &progress)?;
+/// Opens what an encoder made: that it breaks a rule is the encoder's fault.
+///
+/// # Errors
+/// If it does.
+pub fn open_made<'a>(bytes: &'a [u8], dictionary: Option<&'a [u8]>) -> Result<Selvedge<'a>> {
+    let opened = selvedge::open_with(bytes, dictionary, &Limits::NONE);
+    opened.map_err(|finding| ToolError::Mismatch(format!("the encoder wrote a file that breaks a rule: {finding}")))
+}
+
+/// Decodes what an encoder made of some data, at every texel and every so many-th light: errors, and the operations that it states.
+///
+/// # Errors
+/// If it breaks a rule, or data cannot be read.
+pub fn verify(data: &Dataset, bytes: &[u8], dictionary: Option<&[u8]>, every: usize, progress: &dyn Fn(usize, usize)) -> Result<(Metrics, u32)> {
+    let file = open_made(bytes, dictionary)?;
+    let (offset, peak) = (data.statistics().log_offset(), Some(data.statistics().largest as f64));
+    let metrics = compare_every(every, Source::Data(data), Source::File(&file, 0), data.description(), offset, peak, progress)?;
     Ok((metrics, file.header().operations))
 }

@@ -15,7 +15,7 @@ use crate::picture::Picture;
 use crate::similarity::{flip, ssim};
 use crate::speed::{self, Adapter, Speed};
 use crate::{count, files};
-use selvedge::Selvedge;
+use selvedge::{FilteredQuery, Selvedge};
 use serde::{Deserialize, Serialize};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -76,6 +76,18 @@ pub struct Operations {
     pub largest: u64,
     /// What a file states for the worst sample.
     pub stated: Option<u32>,
+}
+
+impl Operations {
+    /// Of a file.
+    pub fn of_file(file: &Selvedge<'_>) -> Operations {
+        Operations::of_random(Some(file.header().operations), |q| count::filtered(file, 0, q.u_q32, q.v_q32, q.light, q.view).operations)
+    }
+
+    fn of_random(stated: Option<u32>, count: impl Fn(&FilteredQuery) -> u64) -> Operations {
+        let counts: Vec<u64> = speed::random_queries(2000).iter().map(count).collect();
+        Operations { mean: counts.iter().sum::<u64>() as f64 / counts.len() as f64, largest: counts.into_iter().max().unwrap_or(0), stated }
+    }
 }
 
 /// A measured setting of a method on a dataset.
@@ -153,37 +165,37 @@ pub enum Subject<'a> {
 
 impl<'a> Subject<'a> {
     /// As a source of radiance.
-    pub fn source(&self, locator: &'a Locator<'a>) -> Source<'a> {
+    pub fn source<'s>(&'s self, locator: &'s Locator<'s>) -> Source<'s> {
         match self {
             Subject::File(file) => Source::File(file, 0),
             Subject::Baseline(decoder) => Source::Baseline(*decoder, locator),
         }
     }
 
+    /// Errors against data, at every so many-th light of each view. What is equal has no finite ratio, which a table of numbers could not hold.
+    ///
+    /// # Errors
+    /// If data cannot be read.
+    pub fn metrics(&self, locator: &Locator<'_>, data: &Dataset, every: usize, offset: f32, peak: f32) -> Result<Metrics> {
+        let found = compare_every(every, Source::Data(data), self.source(locator), data.description(), offset, Some(peak as f64), &|_, _| ())?;
+        Ok(Metrics { psnr_db: found.psnr_db.clamp(-999.0, 999.0), ..found })
+    }
+
     /// Operations of random samples.
     pub fn operations(&self, locator: &Locator<'_>) -> Operations {
-        let queries = speed::random_queries(2000);
-        let counts: Vec<u64> = queries
-            .iter()
-            .map(|q| match self {
-                Subject::File(file) => count::filtered(file, 0, q.u_q32, q.v_q32, q.light, q.view).operations,
-                Subject::Baseline(decoder) => {
-                    let m = locator.file.material();
-                    // The same price of finding directions for all, but for those who look at every one.
-                    let find = if decoder.two_nearest() {
-                        3 * (locator.lights.len() + locator.views.len()) as u64
-                    } else {
-                        count::locate(locator.file, m.light_start, q.light) + count::locate(locator.file, m.view_start, q.view)
-                    };
-                    decoder.operations(&locator.at(q, decoder.two_nearest())) + POSITION + find
-                }
-            })
-            .collect();
-        let stated = match self {
-            Subject::File(file) => Some(file.header().operations),
-            Subject::Baseline(_) => None,
-        };
-        Operations { mean: counts.iter().sum::<u64>() as f64 / counts.len() as f64, largest: counts.into_iter().max().unwrap_or(0), stated }
+        match self {
+            Subject::File(file) => Operations::of_file(file),
+            Subject::Baseline(decoder) => Operations::of_random(None, |q| {
+                let m = locator.file.material();
+                // The same price of finding directions for all, but for those who look at every one.
+                let find = if decoder.two_nearest() {
+                    3 * (locator.lights.len() + locator.views.len()) as u64
+                } else {
+                    count::locate(locator.file, m.light_start, q.light) + count::locate(locator.file, m.view_start, q.view)
+                };
+                decoder.operations(&locator.at(q, decoder.two_nearest())) + POSITION + find
+            }),
+        }
     }
 
     fn speed(&self, locator: &Locator<'_>, adapter: &Adapter) -> Speed {
@@ -233,11 +245,7 @@ impl<'a> Bench<'a> {
     /// Errors over all texels and views and every so many-th light.
     pub fn metrics(&self, subject: &Subject<'_>) -> Result<Metrics> {
         let statistics = self.data.statistics();
-        let peak = Some(statistics.largest as f64);
-        let (reference, offset) = (Source::Data(self.data), statistics.log_offset());
-        let found = compare_every(self.every, reference, subject.source(self.locator), self.data.description(), offset, peak, &|_, _| ())?;
-        // What is equal has no finite ratio, which a table of numbers could not hold.
-        Ok(Metrics { psnr_db: found.psnr_db.clamp(-999.0, 999.0), ..found })
+        subject.metrics(self.locator, self.data, self.every, statistics.log_offset(), statistics.largest)
     }
 
     /// Mean SSIM and FLIP over the pairs that are looked at.
@@ -344,6 +352,17 @@ fn to_json_line<T: Serialize>(line: &T) -> String {
     let mut text = serde_json::to_string(line).expect("plain data");
     text.push('\n');
     text
+}
+
+/// The methods of some lines, in the order in which they came.
+pub fn methods_of<'l>(lines: &[&'l Line]) -> Vec<&'l str> {
+    let mut methods: Vec<&str> = Vec::new();
+    for line in lines {
+        if !methods.contains(&line.method.as_str()) {
+            methods.push(&line.method);
+        }
+    }
+    methods
 }
 
 /// Lines that no other of the same dataset beats in both: fewer of `cost` and less error.

@@ -1,7 +1,7 @@
 //! The page: plots, tables and pictures in one HTML file without scripts, and the same numbers as CSV and JSON.
 
 use super::plot::{COSTS, ERRORS, draw};
-use super::{HeldOut, Kind, Line, Operations, to_csv};
+use super::{HeldOut, Kind, Line, Operations, methods_of, to_csv};
 use crate::error::{Result, ToolError};
 use crate::files;
 use crate::speed::Rate;
@@ -85,24 +85,14 @@ fn datasets(lines: &[Line]) -> Vec<(&str, &str)> {
 /// Lines of one dataset, methods together in the order in which they came, by bytes.
 fn sorted<'l>(lines: &'l [Line], reference: &str) -> Vec<&'l Line> {
     let mut of: Vec<&Line> = lines.iter().filter(|l| l.reference == reference).collect();
-    let mut methods: Vec<&str> = Vec::new();
-    of.iter().for_each(|l| {
-        if !methods.contains(&l.method.as_str()) {
-            methods.push(&l.method);
-        }
-    });
+    let methods = methods_of(&of);
     of.sort_by_key(|l| (methods.iter().position(|m| *m == l.method), l.bytes));
     of
 }
 
 /// Bytes of every method at errors that files reached, by interpolation between its measured points.
 fn at_equal_error(lines: &[&Line], error: fn(&Line) -> f64) -> String {
-    let mut methods: Vec<&str> = Vec::new();
-    lines.iter().for_each(|l| {
-        if l.method != "uncompressed" && !methods.contains(&l.method.as_str()) {
-            methods.push(&l.method);
-        }
-    });
+    let methods: Vec<&str> = methods_of(lines).into_iter().filter(|method| *method != "uncompressed").collect();
     let curve = |method: &str| -> Vec<(f64, f64)> {
         let mut points: Vec<(f64, f64)> = lines.iter().filter(|l| l.method == method).map(|l| (error(l), l.bytes as f64)).collect();
         points.sort_by(|a, b| b.0.total_cmp(&a.0));

@@ -1,6 +1,6 @@
 //! Plots as SVG: an error over a cost, both logarithmic, a line for each method, and the Pareto front.
 
-use super::{Kind, Line, front};
+use super::{Kind, Line, front, methods_of};
 use plotters::prelude::*;
 use std::fmt::Display;
 
@@ -125,12 +125,7 @@ pub fn draw(lines: &[&Line], cost: &Axis, error: &Axis) -> Result<String, String
         let best = front(&placed.iter().map(|p| p.0).collect::<Vec<_>>(), |l| (cost.of)(l).unwrap_or(f64::MAX), |l| (error.of)(l).unwrap_or(f64::MAX));
         let path: Vec<(f64, f64)> = best.iter().filter_map(|l| place(l)).collect();
         chart.draw_series(LineSeries::new(path, RGBColor(250, 214, 120).stroke_width(9))).map_err(told)?;
-        let mut methods: Vec<&str> = Vec::new();
-        placed.iter().for_each(|(l, _)| {
-            if !methods.contains(&l.method.as_str()) {
-                methods.push(&l.method);
-            }
-        });
+        let methods = methods_of(&placed.iter().map(|p| p.0).collect::<Vec<_>>());
         for (row, method) in methods.iter().enumerate() {
             let colour = colour(method);
             let mut points: Vec<(&Line, (f64, f64))> = placed.iter().copied().filter(|(l, _)| l.method == *method).collect();

@@ -6,13 +6,12 @@ use crate::baseline::decoder::{Decoder, Locator};
 use crate::baseline::pca::{Domain, pca};
 use crate::baseline::{clusters, published, tucker};
 use crate::dataset::{Dataset, Description, Writer};
+use crate::encode::driver::open_made;
 use crate::encode::{self, prepare};
 use crate::error::{Result, ToolError};
-use crate::measure::{Metrics, Source, compare_every};
 use crate::speed::{self, Adapter};
 use crate::tensor::{self, fit};
 use crate::{files, progress::Progress};
-use selvedge::Limits;
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -38,6 +37,16 @@ struct Made {
 enum What {
     File(Vec<u8>),
     Baseline(Box<dyn Decoder>),
+}
+
+impl What {
+    /// As something to be measured, and its bytes.
+    fn with<T>(&self, measure: impl FnOnce(Subject<'_>, u64) -> Result<T>) -> Result<T> {
+        match self {
+            What::File(bytes) => measure(Subject::File(&open_made(bytes, None)?), bytes.len() as u64),
+            What::Baseline(decoder) => measure(Subject::Baseline(decoder.as_ref()), decoder.bytes()),
+        }
+    }
 }
 
 /// Receives what was made; asked before, so that nothing is made in vain.
@@ -341,10 +350,6 @@ fn finder(data: &Dataset) -> Result<Vec<u8>> {
     Ok(encode::encode(&prepared, &prepared.own_ensembles(8), &options, &|_, _| ())?.bytes)
 }
 
-fn opened(bytes: &[u8]) -> Result<selvedge::Selvedge<'_>> {
-    selvedge::open(bytes, &Limits::NONE).map_err(|finding| ToolError::Mismatch(format!("the encoder wrote a file that breaks a rule: {finding}")))
-}
-
 fn locator<'a>(file: &'a selvedge::Selvedge<'a>, data: &Dataset) -> Locator<'a> {
     let description = data.description();
     Locator { file, size: description.size, lights: description.lights.clone(), views: description.views.clone() }
@@ -413,48 +418,44 @@ pub fn measure(request: &Request, path: &Path, adapter: &Adapter, lines: &mut St
     };
     let wanted = |method: &str, budget: u64| is_wanted(&known, method, budget);
     let finder_bytes = finder(&data)?;
-    let finder_file = opened(&finder_bytes)?;
+    let finder_file = open_made(&finder_bytes, None)?;
     let finds = locator(&finder_file, &data);
     let bench = Bench::new(&data, &finds, adapter, request.every, &request.out)?;
     let reference = bench.picture(None, &format!("{prefix}-data"))?;
     let mut visit = |made: Made| -> Result<()> {
         let peak = peak_memory().filter(|_| knows_peak.get());
-        let opened_file = match &made.what {
-            What::File(bytes) => Some(opened(bytes)?),
-            What::Baseline(_) => None,
-        };
-        let (subject, bytes, open_seconds) = match (&made.what, &opened_file) {
-            (What::File(bytes), Some(file)) => (Subject::File(file), bytes.len() as u64, Some(speed::open_seconds(bytes, None))),
-            (What::Baseline(decoder), _) => (Subject::Baseline(decoder.as_ref()), decoder.bytes(), None),
-            (What::File(_), None) => unreachable!("a file is opened or refused"),
-        };
+        let own = format!("{prefix}-{}-{}", slug(&made.method), made.budget);
+        let mut open_seconds = None;
         if let What::File(bytes) = &made.what {
-            files::write(&request.out.join("files").join(format!("{prefix}-{}-{}.selv", slug(&made.method), made.budget)), bytes)?;
+            open_seconds = Some(speed::open_seconds(bytes, None));
+            files::write(&request.out.join("files").join(format!("{own}.selv")), bytes)?;
         }
-        let [ssim, flip] = bench.similarity(&subject)?;
-        let shown = made.budget == pictured || made.method == "uncompressed";
-        let picture = shown.then(|| bench.picture(Some(&subject), &format!("{prefix}-{}-{}", slug(&made.method), made.budget))).transpose()?;
-        lines.add(Line {
-            key: key(&made.method, made.budget),
-            dataset: name.clone(),
-            reference: reference.clone(),
-            adapter: adapter.name.clone(),
-            cores,
-            kind: if open_seconds.is_some() { Kind::File } else { Kind::Baseline },
-            bytes,
-            every: bench.every,
-            metrics: bench.metrics(&subject)?,
-            ssim,
-            flip,
-            operations: subject.operations(&finds),
-            speed: subject.speed(&finds, adapter),
-            encode_seconds: made.seconds,
-            open_seconds,
-            peak_memory: peak,
-            found: made.found,
-            picture,
-            method: made.method,
-            setting: made.setting,
+        made.what.with(|subject, bytes| {
+            let [ssim, flip] = bench.similarity(&subject)?;
+            let shown = made.budget == pictured || made.method == "uncompressed";
+            let picture = shown.then(|| bench.picture(Some(&subject), &own)).transpose()?;
+            lines.add(Line {
+                key: key(&made.method, made.budget),
+                dataset: name.clone(),
+                reference: reference.clone(),
+                adapter: adapter.name.clone(),
+                cores,
+                kind: if open_seconds.is_some() { Kind::File } else { Kind::Baseline },
+                bytes,
+                every: bench.every,
+                metrics: bench.metrics(&subject)?,
+                ssim,
+                flip,
+                operations: subject.operations(&finds),
+                speed: subject.speed(&finds, adapter),
+                encode_seconds: made.seconds,
+                open_seconds,
+                peak_memory: peak,
+                found: made.found.clone(),
+                picture,
+                method: made.method.clone(),
+                setting: made.setting.clone(),
+            })
         })
     };
     let say_name = |text: &str| say(&format!("{name}: {text}"));
@@ -490,36 +491,24 @@ fn hold_out(
     let seen = subset(data, &lights, &views, &temporary.path().join("seen.selvset"))?;
     let unseen = subset(data, &held_lights, &held_views, &temporary.path().join("unseen.selvset"))?;
     let finder_bytes = finder(&seen)?;
-    let finder_file = opened(&finder_bytes)?;
+    let finder_file = open_made(&finder_bytes, None)?;
     let finds = locator(&finder_file, &seen);
     // One setting of each method: the uncompressed data are asked for by their own bytes.
     let whole = seen.description().half_bytes();
     let offset = data.statistics().log_offset();
     let wanted = |method: &str, asked: u64| wanted(method, if asked == whole { whole } else { budget });
     let mut visit = |made: Made| -> Result<()> {
-        let opened_file = match &made.what {
-            What::File(bytes) => Some(opened(bytes)?),
-            What::Baseline(_) => None,
-        };
-        let (subject, bytes) = match (&made.what, &opened_file) {
-            (What::File(bytes), Some(file)) => (Subject::File(file), bytes.len() as u64),
-            (What::Baseline(decoder), _) => (Subject::Baseline(decoder.as_ref()), decoder.bytes()),
-            (What::File(_), None) => unreachable!("a file is opened or refused"),
-        };
-        let of = |part: &Dataset, every: usize| -> Result<Metrics> {
-            let found = compare_every(
-                every,
-                Source::Data(part),
-                subject.source(&finds),
-                part.description(),
-                offset,
-                Some(data.statistics().largest as f64),
-                &|_, _| (),
-            )?;
-            Ok(Metrics { psnr_db: found.psnr_db.clamp(-999.0, 999.0), ..found })
-        };
-        let of_seen = of(&seen, every)?;
-        held.add(HeldOut { key: key(&made.method, made.budget), dataset: name.to_owned(), method: made.method, bytes, seen: of_seen, unseen: of(&unseen, 1)? })
+        made.what.with(|subject, bytes| {
+            let of = |part: &Dataset, every: usize| subject.metrics(&finds, part, every, offset, data.statistics().largest);
+            held.add(HeldOut {
+                key: key(&made.method, made.budget),
+                dataset: name.to_owned(),
+                method: made.method.clone(),
+                bytes,
+                seen: of(&seen, every)?,
+                unseen: of(&unseen, 1)?,
+            })
+        })
     };
     let say = |text: &str| say(&format!("{} lights and {} views held out: {text}", held_lights.len(), held_views.len()));
     everything(&seen, request.rank, &[budget], &mut Visitor { wanted: &wanted, visit: &mut visit, say: &say, knows_peak: &Cell::new(false) })
