@@ -7,7 +7,7 @@ set -euo pipefail
 cd "$(dirname "$0")"
 executions=${1:?executions of each target}; shift
 sanitizer=${SANITIZER:-none}
-targets=("$@"); if [ ${#targets[@]} = 0 ]; then targets=(open prefix mutate generate paths importers options); fi
+targets=("$@"); if [ ${#targets[@]} = 0 ]; then targets=(open prefix mutate generate paths importers btf archive pixels options); fi
 cargo +nightly fuzz build -O -s "$sanitizer"
 for target in "${targets[@]}"; do
     mkdir -p "corpus/$target" "artifacts/$target"

@@ -3,7 +3,7 @@
 //! | module | does |
 //! |---|---|
 //! | [`sparsebtf`] | reads the files of SparseBTF 2023 |
-//! | [`folder`] | a folder of images becomes a dataset, and back |
+//! | [`foreign`] | materials in the formats of others become datasets, and back: folders and zips of images, `.btf` of Bonn |
 //! | [`model`], [`write`](mod@write), [`triangulate`] | a quantised material in memory, and its bytes |
 //! | [`dataset`], [`directions`], [`pyramid`] | the working file of a material's data, its grids, its levels of detail |
 //! | [`synth`] | data of modelled mesostructures |
@@ -13,6 +13,7 @@
 //! | [`quantise`] | coefficients become integers |
 //! | [`tensor`] | the encoder of the sparse tensor |
 //! | [`read`], [`trim`](mod@trim), [`sector`] | a file becomes a model again, and a smaller one |
+//! | [`expand`](mod@expand) | a file decoded whole becomes a dataset |
 //! | [`blend`](mod@blend), [`basis`] | a material between two |
 //! | [`story`], [`progress`] | the encoder's part of the demo; a line on a terminal |
 //! | [`validate`](mod@validate) | every finding of a file, in words |
@@ -40,10 +41,11 @@ pub mod directions;
 pub mod encode;
 pub mod error;
 pub mod example;
+pub mod expand;
 pub mod explain;
 pub mod extreme;
 pub mod files;
-pub mod folder;
+pub mod foreign;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod inspect;

@@ -1,5 +1,6 @@
-//! What several tests share: where the data are, loud words for what is skipped, and the bodies of the fuzz targets.
+//! What several tests share: where the data are, loud words for what is skipped, files of others, and the bodies of the fuzz targets.
 
+pub mod foreign;
 pub mod targets;
 
 use std::path::{Path, PathBuf};

@@ -5,12 +5,19 @@
 use selvedge::batch::FilteredQuery;
 use selvedge::{Direction, Finding, First, Limits, Part, Rgb, Selvedge};
 use selvedge_tools::count;
+use selvedge_tools::error::ToolError;
 use selvedge_tools::extreme::{Reach, extreme_model_from, extreme_tensor_from};
+use selvedge_tools::foreign::ImportOptions;
+use selvedge_tools::foreign::archive::Archive;
+use selvedge_tools::foreign::btf::Btf;
+use selvedge_tools::foreign::bytes::Bytes;
+use selvedge_tools::foreign::images::{self, ImageSet};
+use selvedge_tools::foreign::pixels::{self, Colours};
 use selvedge_tools::random::Random;
 use selvedge_tools::read::{model_of, same_triangles};
 use selvedge_tools::vectors::{Answer, Vector};
 use selvedge_tools::write::{lay_out, repair_checksums, take_apart, write_material, write_split};
-use selvedge_tools::{dataset::Dataset, dictionary_file, folder, sparsebtf};
+use selvedge_tools::{dataset::Dataset, dictionary_file, sparsebtf};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
@@ -20,17 +27,22 @@ pub struct Target {
     pub name: &'static str,
     /// What it does with any bytes.
     pub run: fn(&[u8]),
+    /// Bytes of heap that it may take beyond twice the input, if that is bounded: for the files of others.
+    pub memory: Option<usize>,
 }
 
 /// All targets.
-pub const TARGETS: [Target; 7] = [
-    Target { name: "open", run: open },
-    Target { name: "prefix", run: prefix },
-    Target { name: "mutate", run: mutate },
-    Target { name: "generate", run: generate },
-    Target { name: "paths", run: paths },
-    Target { name: "importers", run: importers },
-    Target { name: "options", run: options },
+pub const TARGETS: [Target; 10] = [
+    Target { name: "open", run: open, memory: None },
+    Target { name: "prefix", run: prefix, memory: None },
+    Target { name: "mutate", run: mutate, memory: None },
+    Target { name: "generate", run: generate, memory: None },
+    Target { name: "paths", run: paths, memory: None },
+    Target { name: "importers", run: importers, memory: None },
+    Target { name: "btf", run: btf, memory: Some(1 << 20) },
+    Target { name: "archive", run: archive, memory: Some(IMAGE_MEMORY + (1 << 20)) },
+    Target { name: "pixels", run: image_pixels, memory: Some(IMAGE_MEMORY + (1 << 20)) },
+    Target { name: "options", run: options, memory: None },
 ];
 
 /// Callers of hostile files have limits; these let a sample run in no time.
@@ -346,10 +358,67 @@ pub fn importers(data: &[u8]) {
 
 fn import_folder(path: &Path) {
     let output = path.join("out.selvset");
-    if folder::import(path, &output, &folder::ImportOptions::default(), &|_, _| ()).is_ok() {
+    if images::import(path, &output, &ImportOptions::default(), &|_, _| ()).is_ok() {
         Dataset::open(&output).expect("what was imported can be opened");
     } else {
         assert!(!output.exists(), "an output was left");
+    }
+}
+
+/// Bytes that decoding an image of a hostile file may take.
+pub const IMAGE_MEMORY: usize = 4 << 20;
+
+/// Containers of Bonn: refused with a place inside the file, or every texel that is asked for has its numbers.
+pub fn btf(data: &[u8]) {
+    let length = data.len() as u64;
+    let inside = |error: ToolError| match error {
+        ToolError::Foreign { offset, what, .. } => assert!(offset <= length && !what.is_empty(), "{offset} of {length}: {what}"),
+        other => panic!("{other}"),
+    };
+    let btf = match Btf::read(Bytes::from_memory(Path::new("a.btf"), data.to_vec())) {
+        Ok(btf) => btf,
+        Err(error) => return inside(error),
+    };
+    let (head, texels) = (btf.head(), btf.head().size[0] * btf.head().size[1]);
+    // The light list stands in the file for each view.
+    assert!(btf.texel_len() as u64 / 3 <= length / 8, "{} numbers of a texel", btf.texel_len());
+    assert!(head.unread < length);
+    let mut values = vec![0.0; btf.texel_len() * 2.min(texels)];
+    for first in [0, texels.saturating_sub(2)] {
+        if let Err(error) = btf.texels(first, 2.min(texels), &mut values) {
+            inside(error);
+        }
+    }
+    // A number of the file that is no number is found when its row is read.
+    if head.height_map.is_some()
+        && let Err(error) = btf.height_map()
+    {
+        inside(error);
+    }
+}
+
+/// Zip archives of images: refused with words, or the first and the last image have their pixels.
+pub fn archive(data: &[u8]) {
+    let Ok(archive) = Archive::from_bytes(Bytes::from_memory(Path::new("a.zip"), data.to_vec())) else { return };
+    assert!(archive.names().expect("the directory is read").len() <= data.len());
+    let Ok(set) = ImageSet::of(archive, IMAGE_MEMORY) else { return };
+    let options = ImportOptions { memory: IMAGE_MEMORY, ..ImportOptions::default() };
+    let [width, height] = set.description().size;
+    for pair in [0, set.description().pairs() - 1] {
+        if let Ok((pixels, _)) = set.image(pair, &options) {
+            assert_eq!(pixels.len(), width * height);
+            assert!(pixels.as_flattened().iter().all(|v| (0.0..=65_504.0).contains(v)));
+        }
+    }
+}
+
+/// Single images: refused with words, or as many pixels as the head says.
+pub fn image_pixels(data: &[u8]) {
+    let Ok(opened) = pixels::open(Box::new(std::io::Cursor::new(data)), IMAGE_MEMORY) else { return };
+    let [width, height] = opened.size;
+    assert!(width * height * pixels::PIXEL_BYTES <= IMAGE_MEMORY);
+    if let Ok(pixels) = opened.pixels(Colours::Auto) {
+        assert_eq!(pixels.len(), width * height);
     }
 }
 

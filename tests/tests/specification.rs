@@ -35,6 +35,8 @@ fn every_rule_that_a_comment_cites_is_in_the_specification() {
         "host-tools/src",
         "host-tools/src/baseline",
         "host-tools/src/encode",
+        "host-tools/src/foreign",
+        "host-tools/src/foreign/btf",
         "host-tools/src/synth",
         "host-tools/src/report",
         "host-tools/src/tensor",

@@ -258,6 +258,11 @@ impl Pca<'_> {
         self.rank
     }
 
+    /// The mean over the texels, rows of texels and rows of pairs, `[view][light][colour]`, which are orthonormal columns; each row has [`Pca::rank`] numbers.
+    pub fn factors(&self) -> (&[f32], &[f32], &[f32]) {
+        (&self.mean, &self.of_texels, &self.of_pairs)
+    }
+
     /// Bytes at a rank and width: the mean with its base and scale, both factors, and two scales a component.
     pub fn bytes(&self, rank: usize, bits: u32) -> u64 {
         let (texels, columns) = (self.dataset.description().texels() as u64, self.mean.len() as u64);

@@ -6,7 +6,9 @@ use crate::blend::{Blend, blend};
 use crate::dataset::{Dataset, Sample};
 use crate::dictionary_file::{self, Training};
 use crate::error::{Result, ToolError};
-use crate::folder::{self, ImportOptions};
+use crate::expand::expand;
+use crate::foreign::pixels::Colours;
+use crate::foreign::{self, ImportOptions, Kind, btf, images, ubo};
 use crate::measure::{self, Metrics, Source};
 use crate::model::MetadataModel;
 use crate::progress::Progress;
@@ -23,7 +25,7 @@ use std::path::{Path, PathBuf};
 pub enum Material {
     /// Render a BTF of a modelled mesostructure into a dataset
     Synth(SynthArgs),
-    /// Write the images of a dataset as a folder of EXR or PNG
+    /// Write a dataset or a decoded file in a format of others: folders of EXR or PNG, a zip as UBO2003, a .btf
     Export(ExportArgs),
     /// Train an ensemble of dictionaries on datasets, once, for materials that are not among them
     Train(TrainArgs),
@@ -135,76 +137,163 @@ fn synthesise(args: SynthArgs) -> Result<u8> {
     Ok(0)
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum ImageFormat {
+/// Formats of others.
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum ExportFormat {
+    /// Folder of EXR with every bit
     Exr,
+    /// Folder of PNG: sRGB of 16 bits, values above 1 cut
     Png,
+    /// Zip archive of JPEG, named as those of UBO2003
+    Ubo2003,
+    /// Factorisation of Bonn, FMF06FC
+    Btf,
 }
 
 #[derive(Args)]
 pub struct ExportArgs {
-    /// The dataset
-    dataset: PathBuf,
-    /// The folder to write images and dataset.json into
+    /// A dataset, or a Selvedge file, which is decoded at its own directions
+    source: PathBuf,
+    /// The folder for images and dataset.json, or the file to write
     #[arg(short, long)]
     output: PathBuf,
-    /// exr keeps every bit; png is sRGB of 16 bits and cuts values above 1
+    /// What to write
     #[arg(long, value_enum, default_value = "exr")]
-    format: ImageFormat,
+    format: ExportFormat,
+    /// Components of a .btf, its mean among them
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u16).range(2..=4096))]
+    components: u16,
+    /// Quality of a JPEG
+    #[arg(long, default_value_t = 95, value_parser = clap::value_parser!(u8).range(1..=100))]
+    quality: u8,
+    /// Factor of the values in a JPEG
+    #[arg(long, default_value_t = 1.0, value_parser = parse_positive)]
+    exposure: f64,
+    /// External dictionary of a file
+    #[arg(long)]
+    dictionary: Option<PathBuf>,
+    #[command(flatten)]
+    threads: Threads,
 }
 
 fn export(args: ExportArgs) -> Result<u8> {
-    let dataset = Dataset::open(&args.dataset)?;
-    let format = match args.format {
-        ImageFormat::Exr => folder::Format::Exr,
-        ImageFormat::Png => folder::Format::Png,
-    };
+    args.threads.apply();
     let progress = Progress::new();
-    let cut = folder::export(&dataset, &args.output, format, MEMORY, &|done, all| progress.tell("writing", done, all))?;
-    progress.clear();
-    if cut > 0 {
-        eprintln!("{cut} values above 1 were cut");
+    // A file is expanded beside the result, on disk.
+    let place;
+    let dataset = match Given::open(&args.source, args.dictionary.as_deref())? {
+        Given::Data(dataset) => dataset,
+        given @ Given::File(..) => {
+            let folder = files::folder_of(&args.output);
+            place = tempfile::Builder::new().prefix(".selvedge-").tempdir_in(folder).map_err(ToolError::io(folder))?;
+            let opened = given.opened(&args.source, &Limits::NONE)?;
+            let file = opened.as_ref().ok_or_else(|| ToolError::Usage(format!("{}: not a file to decode", args.source.display())))?;
+            expand(file, &place.path().join("all.selvset"), MEMORY, &|done, all| progress.tell("decoding", done, all))?
+        }
+    };
+    let writing = |done, all| progress.tell("writing", done, all);
+    let mut notes = Vec::new();
+    let mut count_cut = |cut: u64| {
+        if cut > 0 {
+            notes.push(format!("{cut} values above 1 were cut"));
+        }
+    };
+    match args.format {
+        ExportFormat::Exr => count_cut(images::export(&dataset, &args.output, images::Format::Exr, MEMORY, &writing)?),
+        ExportFormat::Png => count_cut(images::export(&dataset, &args.output, images::Format::Png, MEMORY, &writing)?),
+        ExportFormat::Ubo2003 => {
+            let options = ubo::Options { quality: args.quality, exposure: args.exposure as f32, memory: MEMORY };
+            let exported = ubo::export(&dataset, &args.output, &options, &writing)?;
+            count_cut(exported.cut);
+            if let (count @ 1.., worst) = exported.moved {
+                notes.push(format!("{count} directions are not of whole degrees: the names are up to {worst:.2} degrees off"));
+            }
+        }
+        ExportFormat::Btf => {
+            let rms = btf::write::export(&dataset, &args.output, args.components as usize)?;
+            notes.push(format!("the components leave an RMS error of {rms:.3e} of linear radiance"));
+        }
     }
+    progress.clear();
+    notes.iter().for_each(|note| eprintln!("{note}"));
     Ok(0)
 }
 
 /// Bytes of images held at once.
 const MEMORY: usize = 256 << 20;
 
-/// Options of importing a folder of images.
+/// Options of importing what becomes a dataset.
 #[derive(Args)]
-pub struct ImageArgs {
-    /// Images: keep 32-bit floats instead of binary16
+pub struct DataArgs {
+    /// Keep 32-bit floats instead of binary16
     #[arg(long)]
     float: bool,
-    /// Images: values do not contain the cosine of the light's angle
+    /// Values do not contain the cosine of the light's angle, where the data do not say
     #[arg(long)]
     without_cosine: bool,
-    /// Images: name of the material; that of the folder if not given
+    /// Name of the material; that of the file or folder if not given
     #[arg(long)]
     name: Option<String>,
-    /// Images: where the data are from
+    /// Where the data are from
     #[arg(long, default_value = "")]
     origin: String,
-    /// Images: licence of the data
+    /// Licence of the data
     #[arg(long, default_value = "")]
     licence: String,
+    /// What three numbers of an image are; auto takes channels X, Y, Z of an EXR as CIE XYZ
+    #[arg(long, value_enum, default_value = "auto")]
+    colours: Colours,
+    /// Bytes for images that are held at once, in MB; a larger single image is refused
+    #[arg(long, default_value_t = 256, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    memory: u32,
+    /// Write the height map of a .btf, as .exr or .png
+    #[arg(long)]
+    height_map: Option<PathBuf>,
+    #[command(flatten)]
+    threads: Threads,
 }
 
-/// Imports a folder of images.
-pub fn import_images(from: &Path, output: &Path, args: ImageArgs) -> Result<()> {
-    let of_folder = || from.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    let options = ImportOptions {
+/// Makes a dataset of what others have.
+pub fn import_data(from: &Path, kind: Kind, output: &Path, args: DataArgs) -> Result<()> {
+    args.threads.apply();
+    let of_path = || from.file_stem().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let mut options = ImportOptions {
         sample: if args.float { Sample::Float } else { Sample::Half },
         cosine_included: !args.without_cosine,
-        name: args.name.unwrap_or_else(of_folder),
+        name: args.name.unwrap_or_default(),
         origin: args.origin,
         licence: args.licence,
-        memory: MEMORY,
+        memory: (args.memory as usize) << 20,
+        colours: args.colours,
     };
+    if args.height_map.is_some() && kind != Kind::Btf {
+        return Err(ToolError::Usage("--height-map: only a .btf has one".into()));
+    }
     let progress = Progress::new();
-    folder::import(from, output, &options, &|done, all| progress.tell("reading", done, all))?;
+    let tell = |done, all| progress.tell("reading", done, all);
+    let imported = match kind {
+        Kind::Btf => {
+            let btf = btf::Btf::open(from)?;
+            if let Some(path) = &args.height_map {
+                let heights = btf.height_map()?;
+                let [width, height] = btf.head().height_map.unwrap_or_default().map(|n| n as usize);
+                picture::Picture::from_fn(width, height, |x, y| [heights[y * width + x]; 3]).save(path)?;
+            }
+            if options.name.is_empty() {
+                options.name = of_path();
+            }
+            foreign::import_btf(&btf, output, &options, &tell)?
+        }
+        _ => {
+            let set = images::ImageSet::open(from, options.memory)?;
+            if options.name.is_empty() && set.description().texts[0].is_empty() {
+                options.name = of_path();
+            }
+            set.import(output, &options, &tell)?
+        }
+    };
     progress.clear();
+    imported.notes.iter().for_each(|note| eprintln!("{note}"));
     Ok(())
 }
 

@@ -7,6 +7,7 @@ mod encoding;
 mod measuring;
 
 use crate::error::{Result, ToolError};
+use crate::foreign::{self, Kind};
 use crate::{conform, demo, explain, files, inspect, kernel, sparsebtf, validate, vectors, write};
 use clap::{Args, Parser, Subcommand};
 use selvedge::header::CONTENT_DICTIONARY;
@@ -30,28 +31,29 @@ enum Command {
         #[arg(long)]
         out: PathBuf,
     },
-    /// Make a dataset of a folder of images, or a file of a folder of SparseBTF .bin files without encoding anew
+    /// Make a dataset of a .btf or of images in a folder or a zip; or a file of SparseBTF .bin files without encoding anew
     Import {
-        /// Folder with images named tlTTT_plPPP_tvTTT_pvPPP (.exr, .png) or listed in dataset.json; or with
-        /// Coeffs_BTF_NAME_1e-05_{Y,U,V}.bin, DictEnsOrth4D*.bin, NAME_mean_std.bin and xyz_loc.bin
-        folder: PathBuf,
-        /// The material, if the folder has several
+        /// What is imported, told apart by its content: a .btf of Bonn (UBO2014); a zip (UBO2003, ATRIUM) or a folder (UTIA) with
+        /// images named tlTTT plPPP tvTTT pvPPP (.exr, .png, .jpg, .hdr), or a folder with a dataset.json that lists them; or a
+        /// folder with Coeffs_BTF_NAME_1e-05_{Y,U,V}.bin, DictEnsOrth4D*.bin, NAME_mean_std.bin and xyz_loc.bin
+        source: PathBuf,
+        /// SparseBTF: the material, if the folder has several
         #[arg(long)]
         material: Option<String>,
-        /// Blocks along x and y, if the image is not square, as 40x30
+        /// SparseBTF: blocks along x and y, if the image is not square, as 40x30
         #[arg(long, value_parser = parse_blocks)]
         blocks: Option<[usize; 2]>,
-        /// Bits of a quantised coefficient, 1 to 16
+        /// SparseBTF: bits of a quantised coefficient, 1 to 16
         #[arg(long, default_value_t = demo::VALUE_BITS, value_parser = clap::value_parser!(u32).range(1..=16))]
         value_bits: u32,
-        /// The file to write
+        /// The dataset (.selvset) to write, or of SparseBTF the file (.selv)
         #[arg(short, long)]
         output: PathBuf,
-        /// Put the dictionaries into a file of their own
+        /// SparseBTF: put the dictionaries into a file of their own
         #[arg(long)]
         dictionary: Option<PathBuf>,
         #[command(flatten)]
-        images: commands::ImageArgs,
+        data: commands::DataArgs,
     },
     #[command(flatten)]
     Material(commands::Material),
@@ -273,6 +275,32 @@ fn import(folder: &Path, material: Option<String>, blocks: Option<[usize; 2]>, v
     files::write(output, &material)
 }
 
+/// Tells what a file, a dataset or data of others are.
+fn tell_info(source: &Source, json: bool) -> Result<u8> {
+    // Standard input holds a file of this format, and what is not to be known says so by its first broken rule.
+    let is_stream = source.file == Path::new("-");
+    match if is_stream { Kind::Material } else { foreign::detect(&source.file)? } {
+        Kind::Material | Kind::Dictionary => with_material(source, |material| {
+            let info = inspect::info(&material);
+            if json {
+                print_json(&info)?
+            } else {
+                print(&inspect::info_text(&info))?
+            }
+            Ok(0)
+        }),
+        kind => {
+            let info = foreign::info(&source.file, kind, foreign::ImportOptions::default().memory)?;
+            if json {
+                print_json(&info)?
+            } else {
+                print(&info.text())?
+            }
+            Ok(0)
+        }
+    }
+}
+
 /// Tells what is found in each file; the exit code is that of the first that is not good.
 fn check_files(paths: &[PathBuf], dictionary: Option<&Path>, options: &validate::Options, format: Format) -> Result<u8> {
     options.check()?;
@@ -326,21 +354,12 @@ fn run(cli: Cli) -> Result<u8> {
         Command::Demo { out } => demo::run(&out, &mut |line| eprintln!("{line}")).map(|()| 0),
         Command::Material(command) => commands::run(command),
         Command::Measuring(command) => measuring::run(command),
-        Command::Import { folder, output, images, .. } if sparsebtf::materials_in(&folder)?.is_empty() => {
-            commands::import_images(&folder, &output, images).map(|()| 0)
-        }
-        Command::Import { folder, material, blocks, value_bits, output, dictionary, .. } => {
-            import(&folder, material, blocks, value_bits, &output, dictionary.as_deref()).map(|()| 0)
-        }
-        Command::Info { source, json } => with_material(&source, |material| {
-            let info = inspect::info(&material);
-            if json {
-                print_json(&info)?
-            } else {
-                print(&inspect::info_text(&info))?
-            }
-            Ok(0)
-        }),
+        Command::Import { source, material, blocks, value_bits, output, dictionary, data } => match foreign::detect(&source)? {
+            Kind::SparseBtf => import(&source, material, blocks, value_bits, &output, dictionary.as_deref()).map(|()| 0),
+            kind @ (Kind::Btf | Kind::Zip | Kind::Folder) => commands::import_data(&source, kind, &output, data).map(|()| 0),
+            kind => Err(ToolError::Usage(format!("{}: this is a {kind} already", source.display()))),
+        },
+        Command::Info { source, json } => tell_info(&source, json),
         Command::Validate { rules: true, .. } => list_rules(),
         Command::Validate { schema: true, .. } => print(&validate::schema()).map(|()| 0),
         Command::Validate { files, dictionary, limits, format, json, warnings_as_errors, severities, .. } => {

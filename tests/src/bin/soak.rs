@@ -2,10 +2,16 @@
 //!
 //! `soak EXECUTIONS [TARGET...]`; what fails is written beside as `soak-TARGET.bytes` before the panic is told. It has no feedback
 //! from coverage, so it finds less than libFuzzer in the same number of executions; it needs nothing but a stable compiler.
+//!
+//! The heap is watched: reading the files of others may take twice what is given and a constant ([`Target::memory`]).
 
+use peak_alloc::PeakAlloc;
 use selvedge_tests::targets::{TARGETS, suite};
 use selvedge_tools::random::Random;
 use std::path::Path;
+
+#[global_allocator]
+static HEAP: PeakAlloc = PeakAlloc;
 
 /// A seed with a few bytes changed, cut or added.
 fn mutated(random: &mut Random, seeds: &[Vec<u8>]) -> Vec<u8> {
@@ -42,15 +48,27 @@ fn main() {
             seeds.extend(suite().iter().map(|vector| vector.bytes.clone()));
         }
         let mut random = Random::new(executions);
+        // What a process makes once is no cost of a file.
+        seeds.iter().for_each(|seed| (target.run)(seed));
+        let mut most = 0;
         for _ in 0..executions {
             let bytes = mutated(&mut random, &seeds);
-            if std::panic::catch_unwind(|| (target.run)(&bytes)).is_err() {
+            HEAP.reset_peak_usage();
+            let before = HEAP.current_usage();
+            let is_well = std::panic::catch_unwind(|| (target.run)(&bytes)).is_ok();
+            let taken = HEAP.peak_usage().saturating_sub(before).saturating_sub(2 * bytes.len());
+            most = most.max(taken);
+            let is_small = target.memory.is_none_or(|memory| taken <= memory);
+            if !is_small {
+                eprintln!("{}: {taken} bytes beyond twice the input", target.name);
+            }
+            if !is_well || !is_small {
                 let path = format!("soak-{}.bytes", target.name);
                 std::fs::write(Path::new(&path), &bytes).expect("the failure is written");
                 eprintln!("{}: {} bytes fail, in {path}", target.name, bytes.len());
                 std::process::exit(3);
             }
         }
-        println!("{}: {executions} executions of {} seeds, nothing found", target.name, seeds.len());
+        println!("{}: {executions} executions of {} seeds, nothing found; heap at most {most} bytes beyond twice the input", target.name, seeds.len());
     }
 }

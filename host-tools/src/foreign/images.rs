@@ -1,13 +1,11 @@
-//! Folders of images, one per pair of directions, into the dataset file and back.
+//! Sets of images, one per pair of directions, into the dataset file and back: folders, and zip archives as UBO2003 and ATRIUM are published.
 //!
-//! An image is EXR (first layer; R, G, B or else Y; 16 or 32-bit floats, linear; the data window is the image)
-//! or PNG (8 or 16 bits, grey or RGB, read as sRGB and made linear whatever profile it carries). Other channels,
-//! alpha among them, are ignored; palettes are refused. Row 0 of an image is the row y = 0 of texels.
+//! Images are what [`super::pixels`] reads, in the folder, in folders below it, or in the archive. Row 0 of an image is the row y = 0 of texels.
 //!
-//! The directions of an image stand in its name, which ends in `tl<n>pl<n>tv<n>pv<n>` before `.exr` or `.png`:
-//! polar and azimuth of the light, then of the view, in degrees. Any prefix may precede, anything but letters and
-//! digits may separate, case does not matter: `tl023.5_pl030_tv000_pv000.exr`. Or the folder's `dataset.json` lists
-//! the images. All its fields may be left out; no others are allowed:
+//! The directions of an image stand in its name, which ends in `tl<n>pl<n>tv<n>pv<n>` before `.exr`, `.png`, `.jpg`, `.jpeg` or `.hdr`: polar and
+//! azimuth of the light, then of the view, in degrees; or in the view's and then the light's, `tv<n>pv<n>tl<n>pl<n>`. Any prefix may precede, anything
+//! but letters and digits may separate, case does not matter: `tl023.5_pl030_tv000_pv000.exr`, `00008 tl000 pl000 tv030 pv030.jpg`. Or the folder's
+//! `dataset.json` lists the images. All its fields may be left out; no others are allowed:
 //!
 //! ```json
 //! { "cosine_included": true, "texel_nm": [100000, 100000], "name": "", "origin": "", "licence": "",
@@ -15,53 +13,39 @@
 //!   "images": [{ "file": "a.exr", "light": [0, 0], "view": [0, 0] }] }
 //! ```
 //!
-//! With `images`, nothing else in the folder is looked at; without, every `.exr` and `.png` in it that is not hidden
+//! With `images`, nothing else in the folder is looked at; without, every file with such an ending that is not hidden
 //! must have its angles. `lights` and `views` are unit vectors that the dataset shall have, in its order, and every
 //! direction of an image is one of them; an export writes them, so that its import has the same bits. Without them
 //! a set has the directions of the images sorted by polar angle and azimuth, or a known grid's, where they are one.
 //!
 //! Neither way holds the data: as many images as fit are turned from rows of texels into runs of pairs, or back.
 
-use crate::dataset::{Dataset, Description, Sample, Statistics, Writer};
+use super::archive::Archive;
+use super::pixels::{self, to_srgb};
+use super::{ImportOptions, Imported};
+use crate::dataset::{Dataset, Description, Sample, Writer};
 use crate::directions::{from_degrees, grid, to_degrees};
 use crate::error::{Result, ToolError};
 use crate::files;
-use exr::prelude::{Image, IntoSample, ReadChannels as _, ReadLayers as _, ReadSpecificChannel as _, SpecificChannels, Vec2, WritableImage as _, f16};
+use exr::prelude::{Image, IntoSample, SpecificChannels, Vec2, WritableImage as _, f16};
 use glam::DVec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::fs::File;
-use std::io::BufReader;
 use std::path::{Component, Path, PathBuf};
-use std::sync::LazyLock;
 
 /// The file that may list the images.
 const LISTING: &str = "dataset.json";
 /// Directions closer than this are the same, in degrees.
-const SAME_DEGREES: f64 = 0.01;
-/// The dataset's own limits, checked before anything of such a size is held.
+pub const SAME_DEGREES: f64 = 0.01;
+/// The dataset's own limit, checked before anything of such a size is held.
 const MOST_DIRECTIONS: usize = 1024;
-const MOST_PIXELS: usize = 16_384;
-/// Bytes per texel of an image held: three numbers, and beside them what decoding or encoding it needs.
-const IMPORT_BYTES: usize = 12 + 8;
+/// Bytes per texel of an image held while others are decoded, and while it is encoded.
+const IMPORT_BYTES: usize = pixels::PIXEL_BYTES;
 const EXPORT_BYTES: usize = 12 + 12;
-
-/// What an import cannot find in the images.
-#[derive(Clone, Debug, Default)]
-pub struct ImportOptions {
-    /// How values are stored.
-    pub sample: Sample,
-    /// Values contain the cosine of the light's angle; what `dataset.json` says goes first.
-    pub cosine_included: bool,
-    /// Name of the material; if empty, that of `dataset.json`.
-    pub name: String,
-    /// Origin of the data; if empty, that of `dataset.json`.
-    pub origin: String,
-    /// Licence of the data; if empty, that of `dataset.json`.
-    pub licence: String,
-    /// Bytes for the images held at once. One image is held in any case.
-    pub memory: usize,
-}
+/// Bytes that a single image may take in any case.
+const SINGLE: usize = 1 << 20;
+/// Endings of names that are images.
+const ENDINGS: [&str; 5] = ["exr", "png", "jpg", "jpeg", "hdr"];
 
 /// What images an export writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -95,50 +79,139 @@ struct Entry {
     view: [f64; 2],
 }
 
-/// Makes a dataset of a folder; `progress` hears how many of how many images are done.
+/// A set of images whose names are read, in the order of its directions.
+pub struct ImageSet {
+    archive: Archive,
+    /// Names of the images in the dataset's order of pairs.
+    names: Vec<PathBuf>,
+    description: Description,
+    is_listed: bool,
+}
+
+impl ImageSet {
+    /// Reads names, directions and the size of the first image.
+    ///
+    /// # Errors
+    /// If the listing or a name is not as the module says; if a pair of directions is missing or there twice; if the first image cannot be
+    /// decoded; on I/O.
+    pub fn open(path: &Path, memory: usize) -> Result<ImageSet> {
+        ImageSet::of(Archive::open(path)?, memory)
+    }
+
+    /// The same of an archive.
+    ///
+    /// # Errors
+    /// As [`ImageSet::open`].
+    pub fn of(archive: Archive, memory: usize) -> Result<ImageSet> {
+        let path = &archive.path().to_owned();
+        let listing = path.join(LISTING);
+        let is_listed = matches!(archive, Archive::Folder(_)) && listing.try_exists().map_err(ToolError::io(&listing))?;
+        let mut listing: Listing = match is_listed {
+            true => serde_json::from_slice(&files::read(&listing)?).map_err(|error| bad(&listing, error.to_string()))?,
+            false => Listing::default(),
+        };
+        let entries = find(&archive, listing.images.take())?;
+        let lights = set_of("light", path, listing.lights, entries.iter().map(|entry| entry.light))?;
+        let views = set_of("view", path, listing.views, entries.iter().map(|entry| entry.view))?;
+        let names: Vec<PathBuf> = arrange(path, &entries, &lights, &views)?.into_iter().map(Path::to_owned).collect();
+        let memory = memory.max(SINGLE);
+        let first = pixels::open(archive.read(&names[0], memory)?, memory).map_err(|what| bad(&archive.describe(&names[0]), what))?;
+        let description = Description {
+            size: first.size,
+            lights,
+            views,
+            sample: Sample::default(),
+            cosine_included: listing.cosine_included.unwrap_or(true),
+            texel_nm: listing.texel_nm,
+            texts: [listing.name, listing.origin, listing.licence],
+        };
+        Ok(ImageSet { is_listed: listing.cosine_included.is_some(), archive, names, description })
+    }
+
+    /// What the set says of itself.
+    pub fn description(&self) -> &Description {
+        &self.description
+    }
+
+    /// Makes a dataset; `progress` hears how many of how many images are done.
+    ///
+    /// # Errors
+    /// If an image is damaged, not of the first one's size, or has a number that is no radiance, with the file and the pixel; on I/O. There is no
+    /// dataset then.
+    pub fn import(&self, output: &Path, options: &ImportOptions, progress: &dyn Fn(usize, usize)) -> Result<Imported> {
+        let size = self.description.size;
+        let mut description = options.describe(&self.description);
+        if self.is_listed {
+            description.cosine_included = self.description.cosine_included;
+        }
+        let writer = Writer::create(output, description)?;
+        let (texels, pairs) = (size[0] * size[1], self.names.len());
+        let batch = (options.memory / (texels * IMPORT_BYTES)).clamp(1, pairs);
+        let (mut negative, mut first) = (0, 0);
+        while first < pairs {
+            let count = batch.min(pairs - first);
+            // All results are kept, so that the error is that of the first bad image, whichever thread was first.
+            let decoded: Vec<Result<(Vec<[f32; 3]>, u64)>> = (first..first + count).into_par_iter().map(|pair| self.image(pair, options)).collect();
+            let mut images = Vec::with_capacity(count);
+            for result in decoded {
+                let (image, cut) = result?;
+                negative += cut;
+                images.push(image);
+            }
+            (0..texels).into_par_iter().try_for_each_init(Vec::new, |run, texel| {
+                run.clear();
+                run.extend(images.iter().flat_map(|image| image[texel]));
+                writer.put(texel, first, run)
+            })?;
+            first += count;
+            progress(first, pairs);
+        }
+        let notes = if negative == 0 { Vec::new() } else { vec![format!("{negative} values of colours outside of RGB were negative and are 0 now")] };
+        Ok(Imported { statistics: writer.finish()?, notes })
+    }
+
+    /// The linear pixels of a pair's image, row by row, and how many negative values of colours outside of RGB became 0.
+    ///
+    /// # Errors
+    /// If it is damaged, not of the first one's size, or has a number that is no radiance, with the file and the pixel.
+    pub fn image(&self, pair: usize, options: &ImportOptions) -> Result<(Vec<[f32; 3]>, u64)> {
+        let (size, name) = (self.description.size, &self.names[pair]);
+        let path = || self.archive.describe(name);
+        let memory = options.memory.max(SINGLE);
+        let opened = pixels::open(self.archive.read(name, memory)?, memory).map_err(|what| bad(&path(), what))?;
+        if opened.size != size {
+            let first = self.archive.describe(&self.names[0]);
+            let [width, height] = opened.size;
+            let what = format!("{width} x {height} pixels, where the first image, {}, has {} x {}", first.display(), size[0], size[1]);
+            return Err(bad(&path(), what));
+        }
+        let is_xyz = opened.is_xyz(options.colours);
+        let mut pixels = opened.pixels(options.colours).map_err(|what| bad(&path(), what))?;
+        let mut negative = 0;
+        if is_xyz {
+            // Colours that sRGB does not have. Infinities and NaN are left to be refused.
+            pixels.as_flattened_mut().iter_mut().filter(|v| **v < 0.0 && v.is_finite()).for_each(|v| {
+                *v = 0.0;
+                negative += 1;
+            });
+        }
+        let largest = if options.sample == Sample::Half { f16::MAX.to_f32() } else { f32::MAX };
+        match pixels.as_flattened().iter().position(|v| !(0.0..=largest).contains(v)) {
+            Some(i) => {
+                let (x, y, channel) = (i / 3 % size[0], i / 3 / size[0], ["red", "green", "blue"][i % 3]);
+                Err(bad(&path(), format!("pixel ({x}, {y}), {channel}: {} is not a radiance from 0 to {largest:e}", pixels[i / 3][i % 3])))
+            }
+            None => Ok((pixels, negative)),
+        }
+    }
+}
+
+/// Makes a dataset of a folder or an archive of images; `progress` hears how many of how many images are done.
 ///
 /// # Errors
-/// If the listing, a name or an image is not as the module says, with the file and the pixel; if a pair of directions
-/// is missing or there twice; if the images differ in size; on I/O. There is no dataset then.
-pub fn import(folder: &Path, output: &Path, options: &ImportOptions, progress: &dyn Fn(usize, usize)) -> Result<Statistics> {
-    let listing = folder.join(LISTING);
-    let mut listing: Listing = match listing.try_exists().map_err(ToolError::io(&listing))? {
-        true => serde_json::from_slice(&files::read(&listing)?).map_err(|error| bad(&listing, error.to_string()))?,
-        false => Listing::default(),
-    };
-    let entries = find(folder, listing.images.take())?;
-    let lights = set_of("light", folder, listing.lights, entries.iter().map(|entry| entry.light))?;
-    let views = set_of("view", folder, listing.views, entries.iter().map(|entry| entry.view))?;
-    let pairs = arrange(folder, &entries, &lights, &views)?;
-
-    let size = open(pairs[0])?.1;
-    let texts = [(&options.name, listing.name), (&options.origin, listing.origin), (&options.licence, listing.licence)];
-    let description = Description {
-        size,
-        lights,
-        views,
-        sample: options.sample,
-        cosine_included: listing.cosine_included.unwrap_or(options.cosine_included),
-        texel_nm: listing.texel_nm,
-        texts: texts.map(|(asked, listed)| if asked.is_empty() { listed } else { asked.clone() }),
-    };
-    let writer = Writer::create(output, description)?;
-    let texels = size[0] * size[1];
-    let batch = (options.memory / (texels * IMPORT_BYTES)).clamp(1, pairs.len());
-    let mut first = 0;
-    for paths in pairs.chunks(batch) {
-        // All results are kept, so that the error is that of the first bad image, whichever thread was first.
-        let decoded: Vec<Result<Vec<[f32; 3]>>> = paths.par_iter().map(|path| decode(path, size, pairs[0], options.sample)).collect();
-        let images = decoded.into_iter().collect::<Result<Vec<_>>>()?;
-        (0..texels).into_par_iter().try_for_each_init(Vec::new, |run, texel| {
-            run.clear();
-            run.extend(images.iter().flat_map(|image| image[texel]));
-            writer.put(texel, first, run)
-        })?;
-        first += paths.len();
-        progress(first, pairs.len());
-    }
-    writer.finish()
+/// As [`ImageSet::open`] and [`ImageSet::import`].
+pub fn import(path: &Path, output: &Path, options: &ImportOptions, progress: &dyn Fn(usize, usize)) -> Result<Imported> {
+    ImageSet::open(path, options.memory)?.import(output, options, progress)
 }
 
 /// Writes a dataset as a folder of images and a `dataset.json`, which comes last; returns how many values a PNG clamped.
@@ -211,46 +284,39 @@ fn bad(path: &Path, what: impl Into<String>) -> ToolError {
     ToolError::Picture { path: path.to_owned(), what: what.into() }
 }
 
-/// The ending in lower case, if it is that of an image.
-fn ending(path: &Path) -> Option<&'static str> {
-    let found = path.extension()?;
-    ["exr", "png"].into_iter().find(|ending| found.eq_ignore_ascii_case(ending))
+/// Whether a name ends as that of an image does.
+fn is_image(path: &Path) -> bool {
+    path.extension().is_some_and(|found| ENDINGS.iter().any(|ending| found.eq_ignore_ascii_case(ending)))
 }
 
-/// The images of the listing, or of the folder in the order of their names, with paths and sound angles.
-fn find(folder: &Path, listed: Option<Vec<Entry>>) -> Result<Vec<Entry>> {
+/// The images of the listing, or of the archive in the order of their names, with sound angles.
+fn find(archive: &Archive, listed: Option<Vec<Entry>>) -> Result<Vec<Entry>> {
     let mut entries = Vec::new();
     if let Some(listed) = listed {
         for entry in listed {
             // A listing from elsewhere reads nothing outside its folder.
             if entry.file.components().any(|part| !matches!(part, Component::Normal(_))) {
-                return Err(bad(&folder.join(LISTING), format!("{}: not a path inside the folder", entry.file.display())));
+                return Err(bad(&archive.describe(Path::new(LISTING)), format!("{}: not a path inside the folder", entry.file.display())));
             }
-            let file = folder.join(&entry.file);
             // Before hours of reading the others.
+            let file = archive.describe(&entry.file);
             std::fs::metadata(&file).map_err(ToolError::io(&file))?;
-            entries.push(Entry { file, ..entry });
+            entries.push(entry);
         }
     } else {
-        for found in std::fs::read_dir(folder).map_err(ToolError::io(folder))? {
-            let file = found.map_err(ToolError::io(folder))?.path();
-            let hidden = file.file_name().is_some_and(|name| name.as_encoded_bytes().starts_with(b"."));
-            if hidden || ending(&file).is_none() || !file.is_file() {
-                continue;
-            }
+        for file in archive.names()?.into_iter().filter(|name| is_image(name)) {
             let stem = file.file_stem().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
             let Some([light, view]) = angles_of(&stem) else {
-                return Err(bad(&file, format!("the name does not end in tl<n>pl<n>tv<n>pv<n>, and no {LISTING} lists the images")));
+                return Err(bad(&archive.describe(&file), format!("the name does not end in tl<n>pl<n>tv<n>pv<n>, and no {LISTING} lists the images")));
             };
             entries.push(Entry { file, light, view });
         }
-        entries.sort_by(|a, b| a.file.cmp(&b.file));
     }
     for entry in &mut entries {
         for (what, angles) in [("light", &mut entry.light), ("view", &mut entry.view)] {
             let [polar, azimuth] = *angles;
             if !(0.0..=90.0).contains(&polar) || !azimuth.is_finite() {
-                return Err(bad(&entry.file, format!("{what} at ({polar}, {azimuth}) degrees; the polar angle is from 0 to 90")));
+                return Err(bad(&archive.describe(&entry.file), format!("{what} at ({polar}, {azimuth}) degrees; the polar angle is from 0 to 90")));
             }
             // A remainder of minus a trifle rounds to 360.
             let turned = azimuth.rem_euclid(360.0);
@@ -258,27 +324,30 @@ fn find(folder: &Path, listed: Option<Vec<Entry>>) -> Result<Vec<Entry>> {
             *angles = if polar < 1e-9 { [0.0; 2] } else { [polar, if turned >= 360.0 { 0.0 } else { turned }] };
         }
     }
-    if entries.is_empty() { Err(bad(folder, "there are no EXR or PNG images")) } else { Ok(entries) }
+    if entries.is_empty() { Err(bad(archive.path(), "there are no images: no EXR, PNG, JPEG or Radiance pictures")) } else { Ok(entries) }
 }
 
-/// The angles that a stem ends in, from the first `tl` after which all is as it should be.
+/// The angles that a stem ends in, light before view or view before light, from the first tag after which all is as it should be.
 fn angles_of(stem: &str) -> Option<[[f64; 2]; 2]> {
-    stem.match_indices("tl").find_map(|(at, _)| {
-        let mut rest = &stem[at..];
-        let mut next = |tag: &str| {
-            let after = rest.trim_start_matches(|c: char| !c.is_ascii_alphanumeric()).strip_prefix(tag)?;
-            let digits = |text: &str| text.bytes().take_while(u8::is_ascii_digit).count();
-            let sign = usize::from(after.starts_with('-'));
-            let whole = sign + digits(&after[sign..]);
-            // A point is part of the number only before a digit; else it separates.
-            let part = after[whole..].strip_prefix('.').map_or(0, digits);
-            let (number, behind) = after.split_at(if part > 0 { whole + 1 + part } else { whole });
-            rest = behind;
-            number.parse::<f64>().ok()
-        };
-        let angles = [[next("tl")?, next("pl")?], [next("tv")?, next("pv")?]];
-        rest.is_empty().then_some(angles)
-    })
+    let after = |tags: [&str; 4]| {
+        stem.match_indices(tags[0]).find_map(|(at, _)| {
+            let mut rest = &stem[at..];
+            let mut next = |tag: &str| {
+                let after = rest.trim_start_matches(|c: char| !c.is_ascii_alphanumeric()).strip_prefix(tag)?;
+                let digits = |text: &str| text.bytes().take_while(u8::is_ascii_digit).count();
+                let sign = usize::from(after.starts_with('-'));
+                let whole = sign + digits(&after[sign..]);
+                // A point is part of the number only before a digit; else it separates.
+                let part = after[whole..].strip_prefix('.').map_or(0, digits);
+                let (number, behind) = after.split_at(if part > 0 { whole + 1 + part } else { whole });
+                rest = behind;
+                number.parse::<f64>().ok()
+            };
+            let angles = [[next(tags[0])?, next(tags[1])?], [next(tags[2])?, next(tags[3])?]];
+            rest.is_empty().then_some(angles)
+        })
+    };
+    after(["tl", "pl", "tv", "pv"]).or_else(|| after(["tv", "pv", "tl", "pl"]).map(|[view, light]| [light, view]))
 }
 
 /// An angle in a name: three digits, and up to three decimals.
@@ -323,14 +392,14 @@ fn arrange<'a>(folder: &Path, entries: &'a [Entry], lights: &[DVec3], views: &[D
         let distance = |i: usize| degrees_between(set[i], from_degrees(polar, azimuth));
         // An image's direction may be this far from the one that stands for it, and that one as far from a grid's.
         let index = (0..set.len()).min_by(|&a, &b| distance(a).total_cmp(&distance(b))).filter(|&i| distance(i) <= 2.0 * SAME_DEGREES);
-        index.ok_or_else(|| bad(&entry.file, format!("{what} at ({polar}, {azimuth}) degrees is none of those that {LISTING} has")))
+        index.ok_or_else(|| bad(&folder.join(&entry.file), format!("{what} at ({polar}, {azimuth}) degrees is none of those that {LISTING} has")))
     };
     let mut files: Vec<Option<&Path>> = vec![None; lights.len() * views.len()];
     for entry in entries {
         let light = nearest(entry, "light", lights, entry.light)?;
         let view = nearest(entry, "view", views, entry.view)?;
         if let Some(other) = files[view * lights.len() + light].replace(&entry.file) {
-            return Err(bad(&entry.file, format!("the same pair of directions as {}", other.display())));
+            return Err(bad(&folder.join(&entry.file), format!("the same pair of directions as {}", other.display())));
         }
     }
     if let Some(pair) = files.iter().position(Option::is_none) {
@@ -342,106 +411,9 @@ fn arrange<'a>(folder: &Path, entries: &'a [Entry], lights: &[DVec3], views: &[D
     Ok(files.into_iter().flatten().collect())
 }
 
-/// An image whose head is read and whose pixels are not.
-enum Opened {
-    Exr(Box<exr::block::reader::Reader<BufReader<File>>>),
-    Png(Box<png::Reader<BufReader<File>>>),
-}
-
-/// Opens an image and checks all of it that costs no memory; also its width and height.
-fn open(path: &Path) -> Result<(Opened, [usize; 2])> {
-    let kind = ending(path).ok_or_else(|| bad(path, "images end in .exr or .png"))?;
-    let file = BufReader::new(File::open(path).map_err(ToolError::io(path))?);
-    let (opened, size) = if kind == "exr" {
-        let reader = exr::block::read(file, false).map_err(|error| bad(path, error.to_string()))?;
-        let Some(layer) = reader.headers().first().filter(|layer| !layer.deep) else { return Err(bad(path, "the first layer is deep data")) };
-        let found = |name: &str| layer.channels.list.iter().find(|channel| channel.name == *name);
-        let Some(colours) = ["R", "G", "B"].map(found).into_iter().collect::<Option<Vec<_>>>().or_else(|| Some(vec![found("Y")?])) else {
-            return Err(bad(path, "the first layer has neither the channels R, G, B nor Y"));
-        };
-        if colours.iter().any(|c| c.sampling != Vec2(1, 1) || c.sample_type == exr::meta::attribute::SampleType::U32) {
-            return Err(bad(path, "the channels are subsampled or not floats"));
-        }
-        let size = [layer.layer_size.width(), layer.layer_size.height()];
-        (Opened::Exr(Box::new(reader)), size)
-    } else {
-        let mut decoder = png::Decoder::new(file);
-        decoder.set_transformations(png::Transformations::IDENTITY);
-        let reader = decoder.read_info().map_err(|error| bad(path, error.to_string()))?;
-        let (colour, depth) = reader.output_color_type();
-        if colour == png::ColorType::Indexed || !matches!(depth, png::BitDepth::Eight | png::BitDepth::Sixteen) {
-            return Err(bad(path, format!("{colour:?} of {} bits; grey or RGB of 8 or 16 bits are read", depth as u8)));
-        }
-        let size = [reader.info().width as usize, reader.info().height as usize];
-        (Opened::Png(Box::new(reader)), size)
-    };
-    match size.iter().all(|n| (1..=MOST_PIXELS).contains(n)) {
-        true => Ok((opened, size)),
-        false => Err(bad(path, format!("{} x {} pixels; 1 to {MOST_PIXELS} along an axis are possible", size[0], size[1]))),
-    }
-}
-
-/// The linear pixels of an image, row by row, if it has the size of the first one and is all radiance.
-fn decode(path: &Path, size: [usize; 2], first: &Path, sample: Sample) -> Result<Vec<[f32; 3]>> {
-    let (opened, found) = open(path)?;
-    if found != size {
-        let what = format!("{} x {} pixels, where the first image, {}, has {} x {}", found[0], found[1], first.display(), size[0], size[1]);
-        return Err(bad(path, what));
-    }
-    let pixels = match opened {
-        Opened::Exr(reader) => exr_pixels(*reader, size).map_err(|error| bad(path, error.to_string()))?,
-        Opened::Png(reader) => png_pixels(*reader).map_err(|error| bad(path, error.to_string()))?,
-    };
-    let largest = if sample == Sample::Half { f16::MAX.to_f32() } else { f32::MAX };
-    match pixels.as_flattened().iter().position(|v| !(0.0..=largest).contains(v)) {
-        Some(i) => {
-            let (x, y, channel) = (i / 3 % size[0], i / 3 / size[0], ["red", "green", "blue"][i % 3]);
-            Err(bad(path, format!("pixel ({x}, {y}), {channel}: {} is not a radiance from 0 to {largest:e}", pixels[i / 3][i % 3])))
-        }
-        None => Ok(pixels),
-    }
-}
-
-fn exr_pixels(reader: exr::block::reader::Reader<BufReader<File>>, [width, height]: [usize; 2]) -> exr::error::Result<Vec<[f32; 3]>> {
-    let has_rgb = ["R", "G", "B"].iter().all(|name| reader.headers()[0].channels.list.iter().any(|channel| channel.name == **name));
-    // Pixels that no chunk of the file covers stay NaN, and are refused as such.
-    let create = move |_: Vec2<usize>, _: &_| vec![[f32::NAN; 3]; width * height];
-    let set = move |pixels: &mut Vec<[f32; 3]>, at: Vec2<usize>, (r, g, b, y): (f32, f32, f32, f32)| {
-        if let Some(pixel) = pixels.get_mut(at.y() * width + at.x()) {
-            *pixel = if has_rgb { [r, g, b] } else { [y; 3] };
-        }
-    };
-    let channels = exr::image::read::read().no_deep_data().largest_resolution_level().specific_channels();
-    let channels = channels.optional("R", 0.0f32).optional("G", 0.0f32).optional("B", 0.0f32).optional("Y", 0.0f32).collect_pixels(create, set);
-    // Images are decoded side by side, which is parallel enough.
-    let image = channels.first_valid_layer().all_attributes().non_parallel().from_chunks(reader)?;
-    Ok(image.layer_data.channel_data.pixels)
-}
-
-fn png_pixels(mut reader: png::Reader<BufReader<File>>) -> std::result::Result<Vec<[f32; 3]>, png::DecodingError> {
-    let (colour, depth) = reader.output_color_type();
-    let mut bytes = vec![0; reader.output_buffer_size().ok_or(png::DecodingError::LimitsExceeded)?];
-    reader.next_frame(&mut bytes)?;
-    // 8 bits are the 16 of the byte twice: n / 255 is 257 n / 65535.
-    let wide = depth == png::BitDepth::Sixteen;
-    let number = |at: usize| LINEAR[usize::from(if wide { u16::from_be_bytes([bytes[2 * at], bytes[2 * at + 1]]) } else { 257 * u16::from(bytes[at]) })];
-    let samples = colour.samples();
-    let grey = samples < 3;
-    let pixels = bytes.len() / (samples * (1 + usize::from(wide)));
-    Ok((0..pixels).map(|i| std::array::from_fn(|c| number(i * samples + if grey { 0 } else { c }))).collect())
-}
-
-/// Linear values of all 16-bit sRGB values (IEC 61966-2-1).
-static LINEAR: LazyLock<Vec<f32>> = LazyLock::new(|| {
-    let linear = |c: f64| if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) };
-    (0..=u16::MAX).map(|n| linear(f64::from(n) / 65_535.0) as f32).collect()
-});
-
 /// The 16-bit sRGB value of a linear one from 0 to 1.
 fn to_srgb16(linear: f32) -> u16 {
-    let c = f64::from(linear);
-    let encoded = if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 };
-    (encoded * 65_535.0).round() as u16
+    (to_srgb(linear) * 65_535.0).round() as u16
 }
 
 /// Bytes of a PNG, and how many values were clamped; `number` is of a texel and a colour.
@@ -485,7 +457,15 @@ fn to_exr(size: [usize; 2], sample: Sample, number: impl Fn(usize, usize) -> f32
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::fs;
+    use crate::foreign::pixels::{Colours, from_srgb16};
+    use std::fs::{self, File};
+    use std::io::BufReader;
+
+    /// The pixels of an image on disk.
+    fn decode(path: &Path) -> std::result::Result<Vec<[f32; 3]>, String> {
+        let stream = Box::new(BufReader::new(File::open(path).expect("there")));
+        pixels::open(stream, 1 << 20)?.pixels(Colours::Auto)
+    }
 
     const QUIET: &dyn Fn(usize, usize) = &|_, _| {};
 
@@ -530,7 +510,7 @@ mod tests {
                         let dataset = write_dataset(&name("a"), description.clone(), half);
                         assert_eq!(export(&dataset, &name("f"), Format::Exr, memory, QUIET).expect("exported"), 0);
                         let statistics = import(&name("f"), &name("b"), &ImportOptions { memory, ..options(sample) }, QUIET).expect("imported");
-                        assert_eq!(&statistics, dataset.statistics());
+                        assert_eq!(&statistics.statistics, dataset.statistics());
                         assert!(fs::read(name("a")).expect("read") == fs::read(name("b")).expect("read"), "{:?}", name("b"));
                     }
                 }
@@ -551,7 +531,7 @@ mod tests {
         let mut values = [0.0; 7 * 5 * 18];
         back.read(0, 35, &mut Vec::new(), &mut values).expect("read");
         assert!(values.iter().enumerate().all(|(n, v)| (v - (n as f32 / 600.0).min(1.0)).abs() <= 2e-5));
-        assert!((0..=u16::MAX).all(|n| to_srgb16(LINEAR[usize::from(n)]) == n));
+        assert!((0..=u16::MAX).all(|n| to_srgb16(from_srgb16(n)) == n));
         let again = export(&dataset, &at("f"), Format::Png, 5000, QUIET).expect_err("refused").to_string();
         assert!(again.contains("dataset.json"), "{again}");
     }
@@ -597,9 +577,9 @@ mod tests {
             encoder.set_depth(depth);
             encoder.set_palette(vec![0; 6]);
             encoder.write_header().expect("head").write_image_data(data).expect("data");
-            decode(&path, [1, 1], &path, Sample::Half)
+            decode(&path)
         };
-        let grey = LINEAR[257 * 100];
+        let grey = from_srgb16(257 * 100);
         assert_eq!(write(png::ColorType::Grayscale, png::BitDepth::Eight, &[100]).expect("read"), [[grey; 3]]);
         assert_eq!(write(png::ColorType::GrayscaleAlpha, png::BitDepth::Sixteen, &[100, 100, 0, 0]).expect("read"), [[grey; 3]]);
         assert_eq!(write(png::ColorType::Rgba, png::BitDepth::Eight, &[255, 0, 100, 7]).expect("read"), [[1.0, 0.0, grey]]);
@@ -607,7 +587,7 @@ mod tests {
         let path = place.path().join("grey.exr");
         let channels = SpecificChannels::build().with_channel::<f32>("Y").with_channel::<f32>("Z").with_pixel_fn(|_| (0.25, -1.0));
         Image::from_channels((2, 1), channels).write().to_file(&path).expect("written");
-        assert_eq!(decode(&path, [2, 1], &path, Sample::Half).expect("read"), [[0.25; 3]; 2]);
+        assert_eq!(decode(&path).expect("read"), [[0.25; 3]; 2]);
         // Elsewhere on the canvas, and written from the last row on.
         let encoding = exr::image::Encoding { line_order: exr::meta::attribute::LineOrder::Decreasing, ..exr::image::Encoding::UNCOMPRESSED };
         let attributes = exr::meta::header::LayerAttributes::named("a").with_position(Vec2(5, -3));
@@ -615,10 +595,10 @@ mod tests {
         let layer = exr::image::Layer::new((2, 3), attributes, encoding, channels);
         Image::from_layer(layer).write().to_file(&path).expect("written");
         let wanted: Vec<[f32; 3]> = (0..6).map(|i| [(i % 2) as f32, (i / 2) as f32, 0.0]).collect();
-        assert_eq!(decode(&path, [2, 3], &path, Sample::Half).expect("read"), wanted);
+        assert_eq!(decode(&path).expect("read"), wanted);
         let channels = SpecificChannels::build().with_channel::<f32>("Z").with_pixel_fn(|_| (0.25f32,));
         Image::from_channels((2, 1), channels).write().to_file(&path).expect("written");
-        assert!(decode(&path, [2, 1], &path, Sample::Half).expect_err("refused").to_string().contains("neither"));
+        assert!(decode(&path).expect_err("refused").to_string().contains("neither"));
     }
 
     /// What an import says of two lights and one view after `spoil`, with everything that must be in it.
@@ -648,13 +628,13 @@ mod tests {
         refused(&[BAD, "TL30.004pl359.999tv0pv9.exr"], |folder| exr(&folder.join("TL30.004pl359.999tv0pv9.exr"), [3, 2], |_, _| 0.5));
         refused(&["preview.png", "name"], |folder| fs::write(folder.join("preview.png"), "").expect("written"));
         refused(&["tl91", "polar"], |folder| exr(&folder.join("tl91pl0tv0pv0.exr"), [3, 2], |_, _| 0.5));
-        refused(&["no EXR or PNG"], |folder| fs::read_dir(folder).expect("read").for_each(|file| fs::remove_file(file.expect("one").path()).expect("removed")));
+        refused(&["no EXR, PNG"], |folder| fs::read_dir(folder).expect("read").for_each(|file| fs::remove_file(file.expect("one").path()).expect("removed")));
         refused(&[BAD], |folder| fs::write(folder.join(BAD), "no image").expect("written"));
         refused(&["tl60"], |folder| fs::write(folder.join("tl60pl0tv0pv0.png"), "no image").expect("written"));
         let json = |text: &'static str| move |folder: &Path| fs::write(folder.join(LISTING), text).expect("written");
         refused(&[LISTING], json("{"));
         refused(&[LISTING, "colour"], json(r#"{"colour": 1}"#));
-        refused(&["no EXR or PNG"], json(r#"{"images": []}"#));
+        refused(&["no EXR, PNG"], json(r#"{"images": []}"#));
         refused(&["missing.exr"], json(r#"{"images": [{"file": "missing.exr", "light": [0, 0], "view": [0, 0]}]}"#));
         refused(&["../a.exr", "inside"], json(r#"{"images": [{"file": "../a.exr", "light": [0, 0], "view": [0, 0]}]}"#));
         refused(&[BAD, "none of those"], json(r#"{"lights": [[0, 0, 1]]}"#));
@@ -674,7 +654,7 @@ mod tests {
             for at in 0..good.len() {
                 for damaged in [good[..at].to_vec(), [&good[..at], &[good[at] ^ 0x81], &good[at + 1..]].concat()] {
                     fs::write(&path, damaged).expect("written");
-                    if let Ok(pixels) = decode(&path, [6, 5], &path, Sample::Half) {
+                    if let Ok(pixels) = decode(&path) {
                         assert_eq!(pixels.len(), 30);
                     }
                 }

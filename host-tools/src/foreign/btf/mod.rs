@@ -1,0 +1,320 @@
+//! The containers of the University of Bonn, `.btf`: UBO2014 and its kin.
+//!
+//! | signature | what it holds |
+//! |---|---|
+//! | `!DFMF08FCR` | a factorisation of each channel of a decorrelated colour model |
+//! | `!FMF12FCER`, `!FMF06FCR`, `!FMF06FC` | one factorisation of all; the first may be in the logarithm and have a height map |
+//! | `!PVF06FCR`, `!PVF06FC` | a factorisation and a mean for each view; also the older layout with the number 301074 |
+//! | `!BDIF06R2!` | every value in binary16; uncompressed, whole or without the texels of a mask |
+//!
+//! The layouts are documented nowhere but in their readers, which differ. What is done here:
+//!
+//! * **Rows.** Row 0 of a factor is the *lowest* row of the picture, and here the top one comes first, so rows are swapped, as the C++ reader does
+//!   (zeroeffects/btf; the MATLAB one, cgbonn/btflib, leaves them).
+//! * **Model 11.** `U = u (Y + e)`, as btflib has it; `btf.hh` computes `u Y + e` and cuts RGB at 1.
+//! * **Directions.** The light list stands once for each view; the first counts and the others must be of its length.
+//! * **Arrangement.** Factors may have pairs of directions as rows (usual), or texels (btflib alone reads those).
+//! * **Rotations** are a frame for each texel, or none. Values stay in the frames they have, as in both readers; frames that are not the identity are told.
+//! * **Negative values**, which factorisations of dark materials have, become zero and are counted.
+//!
+//! No size is trusted: every table is known to be inside the file before anything is held for it. The side of a factorisation that belongs to directions
+//! is held, in binary32; the side of the texels is read row by row, so a material that unfolds to 20 GB is never in memory.
+
+mod body;
+pub mod colour;
+pub mod write;
+
+use super::bytes::{Bytes, Cursor};
+use crate::error::{Result, ToolError};
+use body::Body;
+use glam::DVec3;
+use serde::Serialize;
+use std::path::Path;
+
+/// Signatures, the longest of a family first.
+const SIGNATURES: [&str; 7] = ["!DFMF08FCR", "!FMF12FCER", "!FMF06FCR", "!FMF06FC", "!PVF06FCR", "!PVF06FC", "!BDIF06R2!"];
+/// In place of the meta block's length: the older layout of `PVF`.
+const OLD_VIEWS: u32 = 301_074;
+/// Most directions and texels along an axis, those of a dataset.
+const MOST_DIRECTIONS: u32 = 1024;
+const MOST_PIXELS: u32 = 16_384;
+/// Most channels whose names are read.
+const MOST_CHANNELS: u32 = 4096;
+
+/// What stands before the values, and in a word what they are.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Head {
+    /// Which of the formats it is.
+    pub signature: &'static str,
+    /// Version of the meta block; none in the older layout of `PVF`.
+    pub version: Option<u32>,
+    /// Name of the measurement setup.
+    pub setup: String,
+    /// Name of the image sensor.
+    pub sensor: String,
+    /// Name of the light source.
+    pub light_source: String,
+    /// Texels in a millimetre, 0 if unknown.
+    pub pixels_per_mm: f32,
+    /// Scale of the colours as the file states it; no known reader applies it.
+    pub rgb_scale: [f32; 3],
+    /// Whether the values contain the cosine of the light's angle, if the file says.
+    pub cosine_included: Option<bool>,
+    /// Names of the channels.
+    pub channels: Vec<String>,
+    /// Texels along x and y.
+    pub size: [usize; 2],
+    /// Light directions.
+    #[serde(skip)]
+    pub lights: Vec<DVec3>,
+    /// View directions.
+    #[serde(skip)]
+    pub views: Vec<DVec3>,
+    /// Frames of texels that the file has.
+    pub rotations: u32,
+    /// Those that are not the identity.
+    pub rotated: u32,
+    /// Size of the height map.
+    pub height_map: Option<[u32; 2]>,
+    /// How the values are stored, in words.
+    pub layout: String,
+    /// Bytes behind the last value.
+    pub unread: u64,
+}
+
+/// A `.btf` file whose head is read and whose tables are known to be there.
+#[derive(Debug)]
+pub struct Btf {
+    bytes: Bytes,
+    head: Head,
+    body: Body,
+    heights: u64,
+}
+
+/// Whether a file that begins with these bytes is of the family, known or not.
+pub fn is_one(start: &[u8]) -> bool {
+    ["!DFMF", "!FMF", "!PVF", "!BDIF"].iter().any(|family| start.starts_with(family.as_bytes()))
+}
+
+impl Btf {
+    /// Opens a file and checks its head and the place of every table.
+    ///
+    /// # Errors
+    /// With the byte offset, if the file is not as its layout says or is of a variant that is not read, which is named.
+    pub fn open(path: &Path) -> Result<Btf> {
+        Btf::read(Bytes::open(path)?)
+    }
+
+    /// The same from bytes.
+    ///
+    /// # Errors
+    /// As [`Btf::open`].
+    pub fn read(bytes: Bytes) -> Result<Btf> {
+        let mut start = vec![0; 12.min(bytes.length()) as usize];
+        bytes.read_at(0, &mut start)?;
+        let Some(signature) = SIGNATURES.into_iter().find(|signature| start.starts_with(signature.as_bytes())) else {
+            let shown: String = String::from_utf8_lossy(&start).chars().take_while(|c| c.is_ascii_graphic()).collect();
+            return bytes.fail(0, format!("the format {shown:?} is not read; known are {}", SIGNATURES.join(", ")));
+        };
+        let mut head = Head { signature, ..Head::default() };
+        let mut cursor = Cursor { bytes: &bytes, at: signature.len() as u64 };
+        let mut heights = 0;
+        let body = if signature.starts_with("!PVF") && cursor.u32("length of the meta block")? == OLD_VIEWS {
+            head.channels = ["R", "G", "B"].map(String::from).to_vec();
+            cursor.u32("components")?;
+            read_size(&mut cursor, &mut head)?;
+            let slots = cursor.u32("views")?;
+            read_directions(&mut cursor, &mut head)?;
+            body::read_views(&mut cursor, &mut head, slots)?
+        } else {
+            cursor.at = signature.len() as u64;
+            read_meta(&mut cursor, &mut head)?;
+            read_directions(&mut cursor, &mut head)?;
+            read_size(&mut cursor, &mut head)?;
+            if signature.starts_with("!BDIF") {
+                body::read_store(&mut cursor, &mut head)?
+            } else {
+                if signature.ends_with('R') {
+                    read_rotations(&mut cursor, &mut head)?;
+                }
+                match signature {
+                    "!DFMF08FCR" => body::read_decorrelated(&mut cursor, &mut head)?,
+                    "!FMF12FCER" => {
+                        let log = read_extension(&mut cursor, &mut head, &mut heights)?;
+                        body::read_full(&mut cursor, &mut head, log)?
+                    }
+                    "!FMF06FCR" | "!FMF06FC" => body::read_full(&mut cursor, &mut head, false)?,
+                    _ => {
+                        cursor.u32("components")?;
+                        let slots = cursor.u32("views")?;
+                        body::read_views(&mut cursor, &mut head, slots)?
+                    }
+                }
+            }
+        };
+        head.unread = bytes.length() - cursor.at;
+        Ok(Btf { bytes, head, body, heights })
+    }
+
+    /// What the file says of itself.
+    pub fn head(&self) -> &Head {
+        &self.head
+    }
+
+    /// Numbers of one texel: `[view][light][colour]`.
+    pub fn texel_len(&self) -> usize {
+        self.head.lights.len() * self.head.views.len() * 3
+    }
+
+    /// Texels that are decoded together: a few megabytes.
+    pub fn batch(&self) -> usize {
+        ((1 << 22) / self.texel_len()).clamp(1, 256).min(self.head.size[0] * self.head.size[1])
+    }
+
+    /// Decodes `count` texels, `[texel][view][light][colour]`, from texel `first` on; rows begin at the top. Values may be negative or not finite.
+    ///
+    /// # Errors
+    /// If a number of the file is not finite, and on I/O.
+    pub fn texels(&self, first: usize, count: usize, values: &mut [f32]) -> Result<()> {
+        let ([width, height], length) = (self.head.size, self.texel_len());
+        let mut done = 0;
+        while done < count {
+            let (x, y) = ((first + done) % width, (first + done) / width);
+            let run = (width - x).min(count - done);
+            self.body.texels(&self.bytes, &self.head, (height - 1 - y) * width + x, run, &mut values[done * length..][..run * length])?;
+            done += run;
+        }
+        Ok(())
+    }
+
+    /// The height map, top row first, as it is stored: the layout states no unit.
+    ///
+    /// # Errors
+    /// If the file has none or a height is not finite, and on I/O.
+    pub fn height_map(&self) -> Result<Vec<f32>> {
+        let Some([width, height]) = self.head.height_map else {
+            return Err(ToolError::Usage(format!("{}: there is no height map", self.bytes.path().display())));
+        };
+        let rows = self.bytes.numbers(self.heights, width as u64 * height as u64, super::bytes::Width::Half)?;
+        Ok(rows.chunks(width as usize).rev().flatten().copied().collect())
+    }
+}
+
+fn read_meta(cursor: &mut Cursor<'_>, head: &mut Head) -> Result<()> {
+    let start = cursor.at;
+    let length = cursor.u32("length of the meta block")?;
+    let version = cursor.u32("version of the meta block")?;
+    if !(1..=4).contains(&version) {
+        return cursor.fail(4, format!("version {version} of the meta block; 1 to 4 are known"));
+    }
+    head.version = Some(version);
+    head.setup = cursor.text(80, "measurement setup")?;
+    head.sensor = cursor.text(80, "image sensor")?;
+    head.light_source = cursor.text(80, "light source")?;
+    head.pixels_per_mm = cursor.f32("pixels per mm")?;
+    head.rgb_scale = cursor.floats("scale of the colours")?;
+    if version > 1 {
+        head.cosine_included = Some(cursor.u32("cosine flag")? != 0);
+    }
+    if version > 2 {
+        let length = cursor.u32("length of the XML text")?;
+        cursor.skip(length as u64, "XML text")?;
+    }
+    head.channels = ["R", "G", "B"].map(String::from).to_vec();
+    if version > 3 {
+        let count = cursor.u32("channels")?;
+        if count == 0 || count > MOST_CHANNELS {
+            return cursor.fail(4, format!("{count} channels"));
+        }
+        head.channels.clear();
+        for _ in 0..count {
+            let length = cursor.u32("length of a channel's name")?;
+            head.channels.push(cursor.text(length, "name of a channel")?);
+        }
+    }
+    if cursor.at != start + length as u64 {
+        return cursor.bytes.fail(start, format!("a meta block of {length} bytes; its fields take {}", cursor.at - start));
+    }
+    if ![1, 3].contains(&head.channels.len()) {
+        let shown: Vec<&str> = head.channels.iter().map(String::as_str).take(4).collect();
+        return cursor.bytes.fail(start, format!("{} channels ({}, ...) are spectral data; RGB and grey are read", head.channels.len(), shown.join(", ")));
+    }
+    Ok(())
+}
+
+fn read_directions(cursor: &mut Cursor<'_>, head: &mut Head) -> Result<()> {
+    let limited = |cursor: &mut Cursor<'_>, what: &str| -> Result<u32> {
+        let count = cursor.u32(what)?;
+        if count == 0 || count > MOST_DIRECTIONS {
+            return cursor.fail(4, format!("{count} {what}; 1 to {MOST_DIRECTIONS} are possible"));
+        }
+        Ok(count)
+    };
+    let views = limited(cursor, "view directions")?;
+    for view in 0..views {
+        head.views.push(read_direction(cursor, "view")?);
+        let lights = limited(cursor, "light directions")?;
+        if view == 0 {
+            for _ in 0..lights {
+                head.lights.push(read_direction(cursor, "light")?);
+            }
+        } else if lights as usize != head.lights.len() {
+            return cursor
+                .fail(4, format!("{lights} light directions of view {view} where view 0 has {}: sets that differ by view are not read", head.lights.len()));
+        } else {
+            cursor.skip(lights as u64 * 8, "light directions")?;
+        }
+    }
+    Ok(())
+}
+
+fn read_direction(cursor: &mut Cursor<'_>, what: &str) -> Result<DVec3> {
+    let [polar, azimuth] = cursor.floats::<2>("direction")?.map(f64::from);
+    let (sin, cos) = polar.sin_cos();
+    // A right angle in binary32 is a little more than one.
+    if polar.abs() > 7.0 || cos < -1e-4 {
+        return cursor.fail(8, format!("a {what} direction {polar} radians from the normal is below the surface"));
+    }
+    let direction = DVec3::new(sin * azimuth.cos(), sin * azimuth.sin(), cos.max(0.0));
+    Ok(direction.normalize())
+}
+
+fn read_size(cursor: &mut Cursor<'_>, head: &mut Head) -> Result<()> {
+    let size = [cursor.u32("width")?, cursor.u32("height")?];
+    if size.iter().any(|n| !(1..=MOST_PIXELS).contains(n)) {
+        return cursor.fail(8, format!("{} x {} texels; 1 to {MOST_PIXELS} along an axis are possible", size[0], size[1]));
+    }
+    head.size = size.map(|n| n as usize);
+    Ok(())
+}
+
+/// Frames of texels; whether they are the identity is all that is kept of them.
+fn read_rotations(cursor: &mut Cursor<'_>, head: &mut Head) -> Result<()> {
+    head.rotations = cursor.u32("rotations")?;
+    let start = cursor.table(head.rotations as u64, 9, super::bytes::Width::Single, "rotations")?;
+    const PART: u32 = 1024;
+    for first in (0..head.rotations).step_by(PART as usize) {
+        let count = PART.min(head.rotations - first);
+        let numbers = cursor.bytes.numbers(start + first as u64 * 36, count as u64 * 9, super::bytes::Width::Single)?;
+        let is_identity = |frame: &[f32]| frame.iter().enumerate().all(|(i, n)| (n - if i % 4 == 0 { 1.0 } else { 0.0 }).abs() < 1e-4);
+        head.rotated += numbers.chunks(9).filter(|frame| !is_identity(frame)).count() as u32;
+    }
+    Ok(())
+}
+
+/// The fields that `FMF12FCER` has before its factorisation; whether the values are logarithms.
+fn read_extension(cursor: &mut Cursor<'_>, head: &mut Head, heights: &mut u64) -> Result<bool> {
+    let version = cursor.u8("version of the extension")?;
+    if version > 2 {
+        return cursor.fail(1, format!("version {version} of the extension of FMF12FCER; 0, 1 and 2 are known"));
+    }
+    let is_log = version >= 1 && cursor.u32("reduction of the dynamic range")? != 0;
+    if version >= 2 {
+        let size = [cursor.u32("width of the height map")?, cursor.u32("height of the height map")?];
+        if size[0] != 0 && size[1] != 0 {
+            *heights = cursor.table(size[0] as u64, size[1] as u64, super::bytes::Width::Half, "height map")?;
+            head.height_map = Some(size);
+        }
+    }
+    Ok(is_log)
+}
