@@ -36,8 +36,8 @@ fn read_text(bytes: &[u8], at: usize) -> Option<(&[u8], &[u8], usize)> {
     Some((bytes.get(start..end)?, bytes.get(end..next)?, next))
 }
 
-/// Characters that are not seen, or that change how others are read (3.4-3).
-fn is_invisible(c: char) -> bool {
+/// Characters that are not seen, or that change how others are read, and that no text of a file may have (3.4-3).
+pub fn is_invisible(c: char) -> bool {
     c.is_control() || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')
 }
 

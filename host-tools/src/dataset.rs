@@ -11,6 +11,7 @@
 use crate::error::{Result, ToolError};
 use crate::files::{folder_of, read_exact_at, write_all_at};
 use glam::DVec3;
+use half::slice::HalfFloatSliceExt as _;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
@@ -22,6 +23,14 @@ const MAGIC: &[u8; 8] = b"\x93SELVSET";
 const HEAD_LENGTH: u64 = 65_536;
 /// Most directions, texels along an axis and bytes of values.
 const LIMITS: (usize, usize, u64) = (1024, 16_384, 1 << 43);
+
+/// The first value that is not from 0 to `largest`.
+fn first_beyond(values: &[f32], largest: f32) -> Option<usize> {
+    let range = 0.0..=largest;
+    // Nearly always there is none, and a fold without an early end is vectorised.
+    let is_good = values.iter().fold(true, |good, v| good & range.contains(v));
+    if is_good { None } else { values.iter().position(|v| !range.contains(v)) }
+}
 
 /// How a value is stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -175,15 +184,20 @@ impl Writer {
     /// If a number is negative or not finite (or, with the place, beyond binary16 where that is stored), or on I/O.
     pub fn put(&self, texel: usize, first_pair: usize, values: &[f32]) -> Result<()> {
         let largest = if self.description.sample == Sample::Half { 65_504.0 } else { f32::MAX };
-        if let Some(i) = values.iter().position(|v| !(0.0..=largest).contains(v)) {
+        if let Some(i) = first_beyond(values, largest) {
             let ([x, y], [light, view]) = (self.texel_place(texel), self.pair_place(first_pair + i / 3));
             let what = format!("texel ({x}, {y}), light {light}, view {view}: {} is not a radiance from 0 to {largest:e}", values[i]);
             return Err(ToolError::Usage(format!("{}: {what}", self.path.display())));
         }
-        let bytes: Vec<u8> = match self.description.sample {
-            Sample::Half => values.iter().flat_map(|&v| half::f16::from_f32(v).to_le_bytes()).collect(),
-            Sample::Float => values.iter().flat_map(|v| v.to_le_bytes()).collect(),
-        };
+        let mut bytes = vec![0; values.len() * self.description.sample.len_bytes()];
+        match self.description.sample {
+            Sample::Half => {
+                let mut half = vec![half::f16::ZERO; values.len()];
+                half.convert_from_f32_slice(values);
+                bytes.as_chunks_mut().0.iter_mut().zip(&half).for_each(|(bytes, v)| *bytes = v.to_le_bytes());
+            }
+            Sample::Float => bytes.as_chunks_mut().0.iter_mut().zip(values).for_each(|(bytes, v)| *bytes = v.to_le_bytes()),
+        }
         let at = (texel * self.description.texel_len() + first_pair * 3) as u64 * self.description.sample.len_bytes() as u64;
         write_all_at(self.file.as_file(), &bytes, HEAD_LENGTH + at).map_err(ToolError::io(&self.path))
     }
@@ -298,14 +312,13 @@ impl Dataset {
         read_exact_at(&self.file, bytes, at).map_err(ToolError::io(&self.path))?;
         match self.description.sample {
             Sample::Half => {
-                use half::slice::HalfFloatSliceExt as _;
                 // Through aligned halves, which the library converts by vector instructions where it can.
                 let halves: Vec<half::f16> = bytes.as_chunks::<2>().0.iter().map(|&b| half::f16::from_le_bytes(b)).collect();
                 halves.convert_to_f32_slice(values);
             }
             Sample::Float => values.iter_mut().zip(bytes.as_chunks::<4>().0).for_each(|(v, &b)| *v = f32::from_le_bytes(b)),
         }
-        match values.iter().position(|v| !(0.0..=f32::MAX).contains(v)) {
+        match first_beyond(values, f32::MAX) {
             Some(i) => Err(invalid(&self.path, at + (i * size) as u64, format!("{} is not a radiance", values[i]))),
             None => Ok(()),
         }

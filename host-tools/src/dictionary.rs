@@ -5,10 +5,9 @@
 //! in its own way and keeps the others. So the costly product with all directions is made once a block
 //! (equation 3 in a subspace), and a dictionary adds small products only.
 
-use crate::linear::{Basis, product, product_at};
+use crate::linear::{Basis, multiply, product, product_at};
 use crate::model::DictionaryModel;
-use faer::linalg::matmul::matmul;
-use faer::{Accum, MatMut, MatRef, Par};
+use faer::{MatMut, MatRef};
 
 /// How one dictionary differs from the shared bases, and its bases over texels.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -96,14 +95,12 @@ impl Ensemble {
             let r = light.rows;
             scratch.b.copy_from_slice(current);
             let rows = core.len() / cl;
-            matmul(
+            multiply(
                 // Row by row; the library's own function for that swaps the strides.
                 MatMut::from_column_major_slice_with_stride_mut(&mut scratch.b, r, rows, cl).transpose_mut(),
-                Accum::Replace,
                 MatRef::from_row_major_slice_with_stride(current, rows, r, cl),
                 MatRef::from_row_major_slice(&light.entries, r, r),
-                1.0,
-                Par::Seq,
+                false,
             );
             current = &scratch.b;
         }

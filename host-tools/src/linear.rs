@@ -5,27 +5,42 @@
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par, Side};
+use half::slice::HalfFloatSliceExt as _;
 use rayon::prelude::*;
+
+/// `out = a * b` (or `out += a * b`) of matrices with any strides.
+pub fn multiply(out: MatMut<'_, f32>, a: MatRef<'_, f32>, b: MatRef<'_, f32>, add: bool) {
+    matmul(out, if add { Accum::Add } else { Accum::Replace }, a, b, 1.0, Par::Seq);
+    clean_registers();
+}
+
+/// Clears the upper halves of the vector registers, to be called after `faer` has worked.
+///
+/// Its microkernels for x86 return without `vzeroupper` (seen with faer 0.24), and from then on every scalar instruction of the thread waits for
+/// registers that it does not read: the import of a `.btf` took four times as long. A conversion from binary16 is compiled to leave them clean, and is
+/// the only instruction sequence of that kind that can be had here without `unsafe`. It costs eight conversions.
+pub fn clean_registers() {
+    let mut numbers = [0.0; 8];
+    [half::f16::ONE; 8].convert_to_f32_slice(&mut numbers);
+    std::hint::black_box(numbers);
+}
 
 /// `out = a * b` (or `out += a * b`): `a` is `m x k`, `b` is `k x n`, row-major.
 pub fn product(out: &mut [f32], a: &[f32], b: &[f32], [m, k, n]: [usize; 3], add: bool) {
-    let accum = if add { Accum::Add } else { Accum::Replace };
     let (a, b) = (MatRef::from_row_major_slice(a, m, k), MatRef::from_row_major_slice(b, k, n));
-    matmul(MatMut::from_row_major_slice_mut(out, m, n), accum, a, b, 1.0, Par::Seq);
+    multiply(MatMut::from_row_major_slice_mut(out, m, n), a, b, add);
 }
 
 /// `out = transpose(a) * b`: `a` is `k x m`, `b` is `k x n`, row-major.
 pub fn product_at(out: &mut [f32], a: &[f32], b: &[f32], [m, k, n]: [usize; 3], add: bool) {
-    let accum = if add { Accum::Add } else { Accum::Replace };
     let (a, b) = (MatRef::from_row_major_slice(a, k, m).transpose(), MatRef::from_row_major_slice(b, k, n));
-    matmul(MatMut::from_row_major_slice_mut(out, m, n), accum, a, b, 1.0, Par::Seq);
+    multiply(MatMut::from_row_major_slice_mut(out, m, n), a, b, add);
 }
 
 /// `out = a * transpose(b)`: `a` is `m x k`, `b` is `n x k`, row-major.
 pub fn product_bt(out: &mut [f32], a: &[f32], b: &[f32], [m, k, n]: [usize; 3], add: bool) {
-    let accum = if add { Accum::Add } else { Accum::Replace };
     let (a, b) = (MatRef::from_row_major_slice(a, m, k), MatRef::from_row_major_slice(b, n, k).transpose());
-    matmul(MatMut::from_row_major_slice_mut(out, m, n), accum, a, b, 1.0, Par::Seq);
+    multiply(MatMut::from_row_major_slice_mut(out, m, n), a, b, add);
 }
 
 /// A square or tall matrix of orthonormal columns, `rows x columns`, row-major.
@@ -94,7 +109,9 @@ impl Basis {
 /// The matrix is `n x n`; what rounding makes negative becomes zero.
 pub fn eigenbasis(matrix: &[f64], n: usize) -> (Basis, Vec<f64>) {
     let symmetric = faer::Mat::from_fn(n, n, |i, j| (matrix[i * n + j] + matrix[j * n + i]) / 2.0);
-    let Ok(eigen) = symmetric.self_adjoint_eigen(Side::Lower) else {
+    let eigen = symmetric.self_adjoint_eigen(Side::Lower);
+    clean_registers();
+    let Ok(eigen) = eigen else {
         // Only for numbers that are not finite, which datasets refuse.
         return (Basis::identity(n), vec![0.0; n]);
     };
@@ -117,6 +134,7 @@ pub fn nearest_orthogonal(matrix: &[f64], n: usize) -> Option<Basis> {
     let m = faer::Mat::from_fn(n, n, |i, j| matrix[i * n + j]);
     let svd = m.svd().ok()?;
     let u = svd.U() * svd.V().transpose();
+    clean_registers();
     u.as_ref().col_iter().all(|c| c.iter().all(|x| x.is_finite())).then(|| Basis::from_fn(n, n, |r, c| u[(r, c)] as f32))
 }
 

@@ -3,7 +3,7 @@
 //! Errors are of linear radiance and of `ln(x + e)`, where `e` is one thousandth of the reference's mean, the same for
 //! everything that is compared with that reference. Files are decoded by the core, at the directions of the reference.
 
-use crate::baseline::decoder::{Blend, Decoder, Locator};
+use crate::baseline::decoder::{Decoder, Locator};
 use crate::dataset::{Dataset, Description, Statistics};
 use crate::error::{Result, ToolError};
 use crate::linear::ordered;
@@ -13,7 +13,6 @@ use selvedge::direction_set::cosine_of;
 use selvedge::{Direction, Rgb, Selvedge};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::LN_2;
-use std::iter::StepBy;
 use std::ops::Range;
 
 /// One material to be compared: radiance at texels and pairs of directions.
@@ -74,8 +73,11 @@ struct Sums {
     largest: Place,
 }
 
-/// Images held at once, in numbers.
-const BUDGET: usize = 1 << 23;
+/// Bytes of the images that all threads hold at once, and most pairs of a thread: runs of two kilobytes of a dataset, and enough parts to share.
+const BUDGET: usize = 512 << 20;
+const MOST_PAIRS: usize = 256;
+/// Images of a baseline that are decoded together.
+const BASELINE_IMAGES: usize = 8;
 
 /// A sample direction as a query: the point that an encoder writes for it (5.1-4).
 pub fn query(direction: glam::DVec3) -> Direction {
@@ -111,7 +113,8 @@ pub fn log_offset(file: &Selvedge<'_>) -> f32 {
     let description = describe(file);
     let mut images_at = Vec::new();
     let mut statistics = Statistics::default();
-    if images(Source::File(file, 0), &description, 0, (0..description.lights.len()).step_by(1), &mut images_at).is_ok() {
+    let first_view: Vec<usize> = (0..description.lights.len()).collect();
+    if images(Source::File(file, 0), &description, &first_view, &mut images_at).is_ok() {
         let count = images_at.len().max(1) as f64;
         statistics.mean = std::array::from_fn(|c| images_at.iter().map(|rgb| rgb[c] as f64).sum::<f64>() / count);
     }
@@ -130,45 +133,99 @@ pub fn nearest(set: &[glam::DVec3], asked: Direction) -> usize {
 /// The image of one pair of a reference's directions, row by row.
 pub fn image(source: Source<'_>, description: &Description, light: usize, view: usize) -> Result<Vec<[f32; 3]>> {
     let mut out = Vec::new();
-    images(source, description, view, (light..light + 1).step_by(1), &mut out)?;
+    images(source, description, &[view * description.lights.len() + light], &mut out)?;
     Ok(out)
 }
 
-/// Radiance of a source at one view and some lights: `[light][texel]`.
-fn images(source: Source<'_>, description: &Description, view: usize, lights: StepBy<Range<usize>>, out: &mut Vec<[f32; 3]>) -> Result<()> {
-    let texels = description.texels();
-    let numbers: Vec<usize> = lights.collect();
-    let (Some(&first), Some(&last)) = (numbers.first(), numbers.last()) else {
-        out.clear();
-        return Ok(());
-    };
-    out.resize(texels * numbers.len(), [0.0; 3]);
+/// Radiance of a source at some pairs, `view * lights + light`, ascending: `[pair][texel]`.
+fn images(source: Source<'_>, description: &Description, pairs: &[usize], out: &mut Vec<[f32; 3]>) -> Result<()> {
+    let (texels, lights) = (description.texels(), description.lights.len());
+    out.resize(texels * pairs.len(), [0.0; 3]);
+    let (Some(&first), Some(&last)) = (pairs.first(), pairs.last()) else { return Ok(()) };
     match source {
         Source::Data(dataset) => {
             let mut bytes = Vec::new();
             let mut run = vec![0.0; (last + 1 - first) * 3];
             for texel in 0..texels {
-                dataset.read_pairs(texel, view * description.lights.len() + first, &mut bytes, &mut run)?;
+                dataset.read_pairs(texel, first, &mut bytes, &mut run)?;
                 let rgb = &run.as_chunks::<3>().0;
-                numbers.iter().enumerate().for_each(|(i, light)| out[i * texels + texel] = rgb[light - first]);
+                pairs.iter().enumerate().for_each(|(i, pair)| out[i * texels + texel] = rgb[pair - first]);
             }
         }
         Source::File(file, level) => {
             let mut scratch = vec![0; file.image_scratch_len()];
             let mut image = vec![Rgb::default(); texels];
-            let view = query(description.views[view]);
-            for (i, light) in numbers.into_iter().enumerate() {
-                let light = query(description.lights[light]);
+            for (&pair, out) in pairs.iter().zip(out.chunks_mut(texels)) {
+                let [light, view] = [description.lights[pair % lights], description.views[pair / lights]].map(query);
                 file.decode_image(level, light, view, &mut scratch, &mut image).expect("the buffers are as long as asked for");
-                out[i * texels..][..texels].iter_mut().zip(&image).for_each(|(out, rgb)| *out = rgb.to_f32());
+                out.iter_mut().zip(&image).for_each(|(out, rgb)| *out = rgb.to_f32());
             }
         }
         Source::Baseline(decoder, locator) => {
-            let lights: Vec<Blend> = numbers.into_iter().map(|light| locator.light(query(description.lights[light]), decoder.two_nearest())).collect();
-            decoder.images(&lights, locator.view(query(description.views[view]), decoder.two_nearest()), out);
+            let mut begun = 0;
+            for same in pairs.chunk_by(|a, b| a / lights == b / lights) {
+                let blend = |pair: &usize| locator.light(query(description.lights[pair % lights]), decoder.two_nearest());
+                let view = locator.view(query(description.views[same[0] / lights]), decoder.two_nearest());
+                decoder.images(&same.iter().map(blend).collect::<Vec<_>>(), view, &mut out[begun * texels..][..same.len() * texels]);
+                begun += same.len();
+            }
         }
     }
     Ok(())
+}
+
+/// Images of a source one after the other, read or decoded as many at once as is good for it.
+struct Images<'a> {
+    source: Source<'a>,
+    held: Range<usize>,
+    pixels: Vec<[f32; 3]>,
+}
+
+impl<'a> Images<'a> {
+    fn new(source: Source<'a>) -> Images<'a> {
+        Images { source, held: 0..0, pixels: Vec::new() }
+    }
+
+    /// How many images of a group it holds.
+    fn most(source: Source<'_>) -> usize {
+        match source {
+            Source::Data(_) => usize::MAX,
+            Source::File(..) => 1,
+            Source::Baseline(..) => BASELINE_IMAGES,
+        }
+    }
+
+    /// The image of pair `i` of a group.
+    fn image(&mut self, description: &Description, group: &[usize], i: usize) -> Result<&[[f32; 3]]> {
+        if !self.held.contains(&i) {
+            let end = group.len().min(i.saturating_add(Images::most(self.source)));
+            images(self.source, description, &group[i..end], &mut self.pixels)?;
+            self.held = i..end;
+        }
+        Ok(&self.pixels[(i - self.held.start) * description.texels()..][..description.texels()])
+    }
+}
+
+/// Sums of the differences of two images, and the largest value of the first.
+fn differences(reference: &[[f32; 3]], other: &[[f32; 3]], log_offset: f32, (light, view): (usize, usize), width: usize) -> (Sums, f32) {
+    let mut sums = Sums::default();
+    let mut peak = 0.0f32;
+    for (texel, (a, b)) in reference.iter().zip(other).enumerate() {
+        for (&a, &b) in a.iter().zip(b) {
+            let difference = b - a;
+            sums.count += 1;
+            sums.different += u64::from(a.to_bits() != b.to_bits());
+            sums.log += (log2(b + log_offset) as f64 - log2(a + log_offset) as f64).powi(2);
+            sums.linear += (difference as f64).powi(2);
+            sums.reference += (a as f64).powi(2);
+            peak = peak.max(a);
+            // The first of equal ones, and what is no number.
+            if difference.abs() > sums.largest.difference || difference.is_nan() {
+                sums.largest = Place { difference: difference.abs(), texel: [texel % width, texel / width], light, view };
+            }
+        }
+    }
+    (sums, peak)
 }
 
 /// Compares a material with a reference, over all texels and pairs of `description`, which is that of the reference.
@@ -216,49 +273,34 @@ pub fn compare_every(
         }
     }
     let (texels, lights) = (description.texels(), description.lights.len());
-    let at_once = (BUDGET / 6 / texels).clamp(1, lights);
-    let chunks = lights.div_ceil(at_once);
-    let parts = description.views.len() * chunks;
-    let work = |part: usize| -> Result<(Sums, f32)> {
-        let (view, first) = (part / chunks, part % chunks * at_once);
-        // The first from `first` on whose number leaves the same rest as the view's: every light has its turn.
-        let start = first + (view % every + every - first % every) % every;
-        let range = (start..(first + at_once).min(lights)).step_by(every);
-        let (mut a, mut b) = (Vec::new(), Vec::new());
-        images(reference, description, view, range.clone(), &mut a)?;
-        images(other, description, view, range, &mut b)?;
-        let mut sums = Sums::default();
-        let mut peak = 0.0f32;
-        for (i, (a, b)) in a.iter().zip(&b).enumerate() {
-            for (&a, &b) in a.iter().zip(b) {
-                let difference = b - a;
-                sums.count += 1;
-                sums.different += u64::from(a.to_bits() != b.to_bits());
-                sums.log += (log2(b + log_offset) as f64 - log2(a + log_offset) as f64).powi(2);
-                sums.linear += (difference as f64).powi(2);
-                sums.reference += (a as f64).powi(2);
-                peak = peak.max(a);
-                // The first of equal ones, and what is no number.
-                if difference.abs() > sums.largest.difference || difference.is_nan() {
-                    let texel = i % texels;
-                    let place = [texel % description.size[0], texel / description.size[0]];
-                    sums.largest = Place { difference: difference.abs(), texel: place, light: start + i / texels * every, view };
-                }
-            }
-        }
-        Ok((sums, peak))
+    // The first on whose number leaves the same rest as the view's: every light has its turn.
+    let pairs: Vec<usize> = (0..description.pairs()).filter(|pair| pair % lights % every == pair / lights % every).collect();
+    let of_data = [reference, other].into_iter().filter(|source| matches!(source, Source::Data(_))).count().max(1);
+    let at_once = (BUDGET / (rayon::current_num_threads() * of_data * texels * size_of::<[f32; 3]>())).clamp(1, (MOST_PAIRS / every).max(1));
+    let groups: Vec<&[usize]> = pairs.chunks(at_once).collect();
+    // Sums are those of single images, so that they do not depend on how many are held.
+    let work = |group: usize| -> Result<Vec<(Sums, f32)>> {
+        let group = groups[group];
+        let (mut a, mut b) = (Images::new(reference), Images::new(other));
+        let each = |i| {
+            let place = (group[i] % lights, group[i] / lights);
+            Ok(differences(a.image(description, group, i)?, b.image(description, group, i)?, log_offset, place, description.size[0]))
+        };
+        (0..group.len()).map(each).collect()
     };
-    let (sums, found_peak) = ordered(parts, work, (Sums::default(), 0.0f32), |(total, peak), part, (sums, part_peak)| {
-        total.count += sums.count;
-        total.different += sums.different;
-        total.log += sums.log;
-        total.linear += sums.linear;
-        total.reference += sums.reference;
-        if sums.largest.difference > total.largest.difference {
-            total.largest = sums.largest;
+    let (sums, found_peak) = ordered(groups.len(), work, (Sums::default(), 0.0f32), |(total, peak), part, images| {
+        for (sums, image_peak) in images {
+            total.count += sums.count;
+            total.different += sums.different;
+            total.log += sums.log;
+            total.linear += sums.linear;
+            total.reference += sums.reference;
+            if sums.largest.difference > total.largest.difference || sums.largest.difference.is_nan() {
+                total.largest = sums.largest;
+            }
+            *peak = peak.max(image_peak);
         }
-        *peak = peak.max(part_peak);
-        progress(part + 1, parts);
+        progress(part + 1, groups.len());
     })?;
     let count = sums.count as f64;
     let peak = peak.unwrap_or(found_peak as f64);

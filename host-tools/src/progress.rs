@@ -1,4 +1,4 @@
-//! One line on a terminal that says how far a long piece of work is; nothing where stderr is no terminal.
+//! How far a long piece of work is: one line on a terminal, nothing where stderr is none; and afterwards how long each step took.
 
 use std::io::{IsTerminal as _, Write as _};
 use std::sync::Mutex;
@@ -14,6 +14,9 @@ struct State {
     what: String,
     begun: Instant,
     shown: Option<Instant>,
+    told: Instant,
+    /// Seconds of each step, in the order of their first mention.
+    steps: Vec<(String, f64)>,
 }
 
 impl Default for Progress {
@@ -25,19 +28,27 @@ impl Default for Progress {
 impl Progress {
     /// Begins.
     pub fn new() -> Progress {
-        let state = State { what: String::new(), begun: Instant::now(), shown: None };
+        let now = Instant::now();
+        let state = State { what: String::new(), begun: now, shown: None, told: now, steps: Vec::new() };
         Progress { is_terminal: std::io::stderr().is_terminal(), state: Mutex::new(state) }
     }
 
     /// Says that `done` of `all` parts of something are done.
     pub fn tell(&self, what: &str, done: usize, all: usize) {
+        let Ok(mut state) = self.state.lock() else { return };
+        let now = Instant::now();
+        // What went by since the last word belongs to what was done by then.
+        let seconds = now.duration_since(state.told).as_secs_f64();
+        state.told = now;
+        match state.steps.iter_mut().find(|step| step.0 == what) {
+            Some(step) => step.1 += seconds,
+            None => state.steps.push((what.to_owned(), seconds)),
+        }
         if !self.is_terminal {
             return;
         }
-        let Ok(mut state) = self.state.lock() else { return };
-        let now = Instant::now();
         if state.what != what || done <= 1 {
-            *state = State { what: what.to_owned(), begun: now, shown: None };
+            (state.what, state.begun, state.shown) = (what.to_owned(), now, None);
         }
         if done < all && state.shown.is_some_and(|shown| now.duration_since(shown).as_millis() < 200) {
             return;
@@ -52,5 +63,13 @@ impl Progress {
         if self.is_terminal {
             let _ = write!(std::io::stderr(), "\r\x1b[K");
         }
+    }
+
+    /// How long each step took, what came after the last under `rest`: `reading 1.2 s, finishing 0.4 s`.
+    pub fn times(&self, rest: &str) -> String {
+        let Ok(state) = self.state.lock() else { return String::new() };
+        let last = (rest.to_owned(), state.told.elapsed().as_secs_f64());
+        let parts: Vec<String> = state.steps.iter().chain([&last]).map(|(what, seconds)| format!("{what} {seconds:.1} s")).collect();
+        parts.join(", ")
     }
 }

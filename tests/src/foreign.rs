@@ -71,7 +71,7 @@ impl Out {
     fn meta(&mut self, version: usize, cosine: usize, channels: &[&str]) {
         let mut meta = Out::default();
         meta.u32(version);
-        for text in ["Dome 1", "sensor", "lamp"] {
+        for text in ["Dome 1", "sen\u{feff}sor", "lamp\u{202e}"] {
             let mut field = text.as_bytes().to_vec();
             field.resize(80, 0);
             meta.0.extend(field);

@@ -9,7 +9,7 @@ use super::decoder::{At, Blend, Decoder, EXPONENTIAL, Frame, Pairs, add_row, dot
 use super::{Row, Sums};
 use crate::dataset::Dataset;
 use crate::error::Result;
-use crate::linear::{eigenbasis, ordered, product, product_at, product_bt};
+use crate::linear::{clean_registers, eigenbasis, ordered, product, product_at, product_bt};
 use crate::random::Random;
 use crate::transfer::log2;
 use std::cell::RefCell;
@@ -160,6 +160,7 @@ pub(super) fn pass<T: Send, A>(dataset: &Dataset, work: impl Fn(usize, &[f32]) -
 /// Orthonormal columns with the span of a tall matrix, both row-major.
 fn orthonormal(matrix: &[f64], columns: usize) -> Vec<f32> {
     let q = faer::Mat::from_fn(matrix.len() / columns, columns, |r, c| matrix[r * columns + c]).qr().compute_thin_Q();
+    clean_registers();
     (0..matrix.len()).map(|i| q[(i / columns, i % columns)] as f32).collect()
 }
 

@@ -249,6 +249,9 @@ pub struct DataArgs {
     /// Write the height map of a .btf, as .exr or .png
     #[arg(long)]
     height_map: Option<PathBuf>,
+    /// Tell how long each step took
+    #[arg(long)]
+    times: bool,
     #[command(flatten)]
     threads: Threads,
 }
@@ -293,6 +296,9 @@ pub fn import_data(from: &Path, kind: Kind, output: &Path, args: DataArgs) -> Re
         }
     };
     progress.clear();
+    if args.times {
+        eprintln!("{}", progress.times("statistics"));
+    }
     imported.notes.iter().for_each(|note| eprintln!("{note}"));
     Ok(())
 }

@@ -120,6 +120,9 @@ pub struct EncodeArgs {
     /// Tell what was reached, as JSON, to stdout
     #[arg(long)]
     json: bool,
+    /// Tell how long each step took
+    #[arg(long)]
+    times: bool,
     #[command(flatten)]
     threads: Threads,
 }
@@ -252,8 +255,9 @@ pub fn encode(args: &EncodeArgs) -> Result<u8> {
     let data = Dataset::open(&args.dataset)?;
     let beside = files::folder_of(&args.output);
     let temporary = tempfile::Builder::new().prefix(".selvedge-").tempdir_in(beside).map_err(ToolError::io(beside))?;
-    let coarser = pyramid::levels(&data, args.levels as usize, temporary.path())?;
     let progress = Progress::new();
+    let coarser = pyramid::levels(&data, args.levels as usize, temporary.path())?;
+    progress.tell("coarser levels", 1, 1);
     let transfer = args.transfer.unwrap_or(Domain::Log);
     let best = match args.method {
         Method::SparseEnsemble => {
@@ -265,6 +269,9 @@ pub fn encode(args: &EncodeArgs) -> Result<u8> {
     };
     let Some(best) = best else { return Err(ToolError::Usage("no file reaches the goal".into())) };
     progress.clear();
+    if args.times {
+        eprintln!("{}", progress.times("the rest"));
+    }
     files::write(&args.output, &best.bytes)?;
     for told in &best.told.tried {
         eprintln!("tried {}", told.line());

@@ -7,7 +7,7 @@
 
 use super::ksvd::{Code, Found, Pursuit, Rows, code_all, code_with, first_atoms, gram, iterate, normalise};
 use crate::baseline::pca::Pca;
-use crate::linear::{product, product_bt};
+use crate::linear::{clean_registers, product, product_bt};
 
 /// How to decompose.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -140,6 +140,7 @@ fn solve_atoms(samples: &Rows, codes: &[Code], atoms: usize) -> Rows {
         Ok(factor) => faer::linalg::solvers::Solve::solve(&factor, &right),
         Err(_) => right,
     };
+    clean_registers();
     Rows { dim, values: (0..atoms * dim).map(|i| solved[(i / dim, i % dim)] as f32).collect() }
 }
 
