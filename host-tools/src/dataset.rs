@@ -21,11 +21,15 @@ use std::path::{Path, PathBuf};
 const MAGIC: &[u8; 8] = b"\x93SELVSET";
 /// Bytes before the values.
 const HEAD_LENGTH: u64 = 65_536;
+/// Most directions of a set.
+pub const MOST_DIRECTIONS: usize = 1024;
+/// Most texels along an axis.
+pub const MOST_TEXELS: usize = 16_384;
 /// Most directions, texels along an axis and bytes of values.
-const LIMITS: (usize, usize, u64) = (1024, 16_384, 1 << 43);
+const LIMITS: (usize, usize, u64) = (MOST_DIRECTIONS, MOST_TEXELS, 1 << 43);
 
 /// The first value that is not from 0 to `largest`.
-fn first_beyond(values: &[f32], largest: f32) -> Option<usize> {
+pub fn first_beyond(values: &[f32], largest: f32) -> Option<usize> {
     let range = 0.0..=largest;
     // Nearly always there is none, and a fold without an early end is vectorised.
     let is_good = values.iter().fold(true, |good, v| good & range.contains(v));
@@ -44,6 +48,14 @@ pub enum Sample {
 }
 
 impl Sample {
+    /// Largest value that it holds.
+    pub fn largest(self) -> f32 {
+        match self {
+            Sample::Half => half::f16::MAX.to_f32(),
+            Sample::Float => f32::MAX,
+        }
+    }
+
     /// Bytes of a value.
     pub fn len_bytes(self) -> usize {
         match self {
@@ -169,6 +181,11 @@ impl Writer {
         let folder = folder_of(path);
         let file = tempfile::Builder::new().prefix(".selvedge-").tempfile_in(folder).map_err(|error| ToolError::io(path)(error.kind().into()))?;
         let length = HEAD_LENGTH + description.texels() as u64 * description.texel_len() as u64 * description.sample.len_bytes() as u64;
+        // A few megabytes of factors may unfold to terabytes, and the file has no bytes on the disk before they are written.
+        let free = fs4::available_space(folder).map_err(ToolError::io(folder))?;
+        if length > free {
+            return Err(ToolError::Usage(format!("{}: the dataset takes {length} bytes, and {free} are free", path.display())));
+        }
         file.as_file().set_len(length).map_err(ToolError::io(path))?;
         Ok(Writer { file, path: path.to_owned(), description })
     }
@@ -183,7 +200,7 @@ impl Writer {
     /// # Errors
     /// If a number is negative or not finite (or, with the place, beyond binary16 where that is stored), or on I/O.
     pub fn put(&self, texel: usize, first_pair: usize, values: &[f32]) -> Result<()> {
-        let largest = if self.description.sample == Sample::Half { 65_504.0 } else { f32::MAX };
+        let largest = self.description.sample.largest();
         if let Some(i) = first_beyond(values, largest) {
             let ([x, y], [light, view]) = (self.texel_place(texel), self.pair_place(first_pair + i / 3));
             let what = format!("texel ({x}, {y}), light {light}, view {view}: {} is not a radiance from 0 to {largest:e}", values[i]);

@@ -34,7 +34,7 @@ pub enum ToolError {
         /// What is wrong there.
         what: String,
     },
-    /// A picture could not be encoded.
+    /// A picture or a set of pictures is not as it should be, or could not be encoded.
     #[error("{path}: {what}")]
     Picture {
         /// The file.
@@ -63,8 +63,8 @@ impl ToolError {
     pub fn exit_code(&self) -> u8 {
         match self {
             ToolError::Usage(_) => 1,
-            ToolError::Io { .. } | ToolError::Picture { .. } => 2,
-            ToolError::Foreign { .. } | ToolError::Mismatch(_) | ToolError::Different(_) => 3,
+            ToolError::Io { .. } => 2,
+            ToolError::Foreign { .. } | ToolError::Picture { .. } | ToolError::Mismatch(_) | ToolError::Different(_) => 3,
             ToolError::Kernel(_) => 5,
             ToolError::Invalid { finding, .. } => exit_code_of(finding.rule),
         }

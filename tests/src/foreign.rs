@@ -14,15 +14,16 @@ pub struct Written {
     pub bytes: Vec<u8>,
     /// Texels along x and y, lights, views.
     pub shape: [usize; 4],
-    /// `[texel, top row first][view][light][colour]`, before anything is cut.
+    /// `[texel][view][light][colour]`, before anything is cut.
     pub expected: Vec<[f64; 3]>,
     /// How far binary32 may be from it.
     pub tolerance: f64,
 }
 
 /// Directions of the tests: polar angle and azimuth in radians.
-const LIGHTS: [[f32; 2]; 3] = [[0.0, 0.0], [0.5, 1.0], [1.2, -2.0]];
-const VIEWS: [[f32; 2]; 2] = [[0.1, 3.0], [1.5, 0.25]];
+pub const LIGHTS: [[f32; 2]; 3] = [[0.0, 0.0], [0.5, 1.0], [1.2, -2.0]];
+/// The same of views.
+pub const VIEWS: [[f32; 2]; 2] = [[0.1, 3.0], [1.5, 0.25]];
 /// Texels along x and y: not as many as pairs, or nothing would tell rows of the one from rows of the other.
 const SIZE: [usize; 2] = [4, 2];
 
@@ -144,13 +145,10 @@ fn factorisation(out: &mut Out, random: &mut Random, width: usize, components: u
     (0..rows * columns).map(|i| (0..components).map(|k| u[i / columns * components + k] * v[i % columns * components + k]).sum()).collect()
 }
 
-/// All texels, top row first, from values at `(texel of the file, pair, channel)`.
+/// All texels, as they stand in the file, from values at `(texel of the file, pair, channel)`.
 fn arranged(value: impl Fn(usize, usize, usize) -> f64, colour: impl Fn([f64; 3]) -> [f64; 3]) -> Vec<[f64; 3]> {
-    let [width, height] = SIZE;
     let pairs = LIGHTS.len() * VIEWS.len();
-    // Row 0 of the file is the lowest of the picture.
-    let texel = |i: usize| (height - 1 - i / width) * width + i % width;
-    (0..width * height * pairs).map(|i| colour([0, 1, 2].map(|c| value(texel(i / pairs), i % pairs, c)))).collect()
+    (0..SIZE[0] * SIZE[1] * pairs).map(|i| colour([0, 1, 2].map(|c| value(i / pairs, i % pairs, c)))).collect()
 }
 
 /// The colour models by their numbers, from the published readers.

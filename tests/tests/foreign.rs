@@ -1,6 +1,6 @@
 //! Formats of others: every variant is read as an independent writer meant it, exports come back, and nothing that is damaged does harm.
 
-use selvedge_tests::foreign::{Written, btf_variants, radiance, zip};
+use selvedge_tests::foreign::{LIGHTS, VIEWS, Written, btf_variants, radiance, zip};
 use selvedge_tests::program;
 use selvedge_tests::targets::{archive, btf, image_pixels};
 use selvedge_tools::dataset::{Dataset, Description, Sample, Writer};
@@ -29,6 +29,11 @@ fn every_variant_of_btf_is_read_as_it_was_written() {
         let head = btf.head();
         assert_eq!((head.size, head.lights.len(), head.views.len()), ([width, height], lights, views), "{}", written.name);
         assert_eq!(head.unread, 0, "{}", written.name);
+        for (found, angles) in head.lights.iter().zip(LIGHTS).chain(head.views.iter().zip(VIEWS)) {
+            let [polar, azimuth] = angles.map(f64::from);
+            let expected = [polar.sin() * azimuth.cos(), polar.sin() * azimuth.sin(), polar.cos()];
+            assert!(found.to_array().iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{}: {found} for {expected:?}", written.name);
+        }
         // Whole, and texel by texel: runs begin and end anywhere.
         let mut all = vec![0.0; written.expected.len() * 3];
         btf.texels(0, width * height, &mut all).expect("decoded");
@@ -59,7 +64,7 @@ fn heads_say_what_stands_in_them() {
     assert_eq!(read(&of("version 1")).head().cosine_included, None);
     let heights = read(&of("extension 2, log true, heights true"));
     assert_eq!(heights.head().height_map, Some([2, 2]));
-    assert_eq!(heights.height_map().expect("there"), [0.75, 1.0, 0.25, 0.5]);
+    assert_eq!(heights.height_map().expect("there"), [0.25, 0.5, 0.75, 1.0]);
     let masked = read(&of("compression 2, 2 lines"));
     assert!(masked.head().layout.contains("2 texels masked out and absent"), "{}", masked.head().layout);
 }
@@ -113,8 +118,10 @@ fn variants_that_are_not_read_are_named() {
     let fmf = of("FMF12FCER, extension 0");
     let at = 10 + u32::from_le_bytes(fmf[10..14].try_into().expect("four")) as usize + 4 + 2 * (12 + 24) + 8 + 4 + 6 * 36;
     assert!(said(with(fmf, at, &[3])).contains("version 3 of the extension"));
-    let spectral = btf_variants().into_iter().find(|written| written.name.contains("1 channels")).expect("one").bytes;
-    assert!(spectral.windows(3).any(|w| w == b"550"));
+    // Three channels that are no colours; names are behind version 4's counts.
+    let names = dfmf.windows(15).position(|w| w == b"\x01\0\0\0R\x01\0\0\0G\x01\0\0\0B").expect("the names");
+    let said = said(with(dfmf.clone(), names + 4, b"X"));
+    assert!(said.contains("X, G, B"), "{said}");
 }
 
 /// Directions that have whole degrees.
@@ -280,6 +287,10 @@ fn archives_of_ubo2003_and_atrium_are_read() {
     assert!(near(image[0][0], 1.0) && near(image[0][1], 0.0) && near(image[12][1], 0.5) && near(image[3][2], 0.75), "{image:?}");
     let image = dataset.image(1, 0).expect("read");
     assert!(near(image[0][0], 0.25) && near(image[0][1], 0.125) && near(image[12][1], 0.0), "{image:?}");
+    for header in ["COLORCORR=1 1 2\n", "EXPOSURE=1e30\nEXPOSURE=1e30\n", "EXPOSURE=1e-30\nEXPOSURE=1e-30\n", "EXPOSURE=-1\n"] {
+        let said = pixels::open(Box::new(std::io::Cursor::new(radiance(header, "-Y 4 +X 4", &rows))), 1 << 20).err().expect("refused");
+        assert!(said.contains("COLORCORR") || said.contains("exposure"), "{said}");
+    }
     for (resolution, is_read) in [("+Y 4 +X 4", true), ("-X 4 +Y 4", false), ("+X 2 -Y 8", false), ("-Y 4", false), ("-Y four +X 4", false)] {
         let opened = pixels::open(Box::new(std::io::Cursor::new(radiance("", resolution, &rows))), 1 << 20);
         assert_eq!(opened.is_ok(), is_read, "{resolution}");
@@ -416,6 +427,17 @@ fn the_program_brings_materials_in_and_out() {
         assert!(good(&["info", output]).0.contains("3 light, 2 view"), "{format}");
         good(&["import", output, "-o", "f.selvset", "--float"]);
     }
+    // A folder that was packed whole is read by its listing.
+    let packed: Vec<(String, Vec<u8>)> = std::fs::read_dir(here.join("d"))
+        .expect("read")
+        .map(|entry| entry.expect("one"))
+        .map(|entry| (format!("d/{}", entry.file_name().to_string_lossy()), std::fs::read(entry.path()).expect("read")))
+        .collect();
+    let files: Vec<(&str, &[u8])> = packed.iter().map(|(name, bytes)| (name.as_str(), bytes.as_slice())).collect();
+    std::fs::write(here.join("packed.zip"), zip(&files)).expect("written");
+    good(&["import", "packed.zip", "-o", "packed.selvset", "--float"]);
+    good(&["compare", "b.selv", "packed.selvset", "--fail", "1e-30", "--warn", "1e-30"]);
+    assert!(good(&["info", "packed.selvset"]).0.contains("CC0"));
     // What came out of the file as EXR has the decoder's bits.
     good(&["import", "d", "-o", "f.selvset", "--float"]);
     good(&["compare", "b.selv", "f.selvset", "--fail", "1e-30", "--warn", "1e-30"]);
@@ -433,6 +455,13 @@ fn the_program_brings_materials_in_and_out() {
         (&["import", "b.selv", "-o", "y.selvset"], "already"),
         (&["import", "a.selvset", "-o", "y.selvset"], "already"),
         (&["import", "b.zip", "-o", "y.selvset", "--height-map", "h.exr"], "height-map"),
+        (&["import", "a.btf", "-o", "y.selvset", "--height-map", "h.png"], ".exr"),
+        (&["import", "a.btf", "-o", "y.selvset", "--memory", "9"], "--memory"),
+        (&["import", "a.btf", "-o", "y.selvset", "--blocks", "2x2"], "--blocks"),
+        (&["import", "a.btf", "-o", "y.selvset", "--name", "a\u{200b}"], "not seen"),
+        (&["import", "a.btf", "-o", "d"], "folder"),
+        (&["import", "a.btf", "-o", "a.btf"], "source"),
+        (&["export", "b.selv", "-o", "g", "--format", "png", "--exposure", "2"], "--exposure"),
         (&["import", "a.btf", "-o", "y.selvset", "--height-map", "h.exr"], "no height map"),
     ] {
         let (code, _, error) = run(arguments, here);

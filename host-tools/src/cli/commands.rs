@@ -71,6 +71,12 @@ pub fn parse_positive(text: &str) -> std::result::Result<f64, String> {
     text.parse().ok().filter(|v: &f64| v.is_finite() && *v > 0.0).ok_or_else(|| "a positive number".into())
 }
 
+/// The path of an EXR.
+fn parse_exr(text: &str) -> std::result::Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("exr")) { Ok(path) } else { Err("a path that ends in .exr".into()) }
+}
+
 pub fn parse_bytes(text: &str) -> std::result::Result<u64, String> {
     let (number, unit) = text.split_at(text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len()));
     let unit = match unit {
@@ -161,14 +167,16 @@ pub struct ExportArgs {
     #[arg(long, value_enum, default_value = "exr")]
     format: ExportFormat,
     /// Components of a .btf, its mean among them
-    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u16).range(2..=4096))]
-    components: u16,
-    /// Quality of a JPEG
-    #[arg(long, default_value_t = 95, value_parser = clap::value_parser!(u8).range(1..=100))]
-    quality: u8,
-    /// Factor of the values in a JPEG
-    #[arg(long, default_value_t = 1.0, value_parser = parse_positive)]
-    exposure: f64,
+    ///
+    /// 100 if not given
+    #[arg(long, value_parser = clap::value_parser!(u16).range(2..=4096))]
+    components: Option<u16>,
+    /// Quality of a JPEG, 1 to 100; 95 if not given
+    #[arg(long, value_parser = clap::value_parser!(u8).range(1..=100))]
+    quality: Option<u8>,
+    /// Factor of the values in a JPEG; 1 if not given
+    #[arg(long, value_parser = super::parse_exposure)]
+    exposure: Option<f32>,
     /// External dictionary of a file
     #[arg(long)]
     dictionary: Option<PathBuf>,
@@ -178,6 +186,11 @@ pub struct ExportArgs {
 
 fn export(args: ExportArgs) -> Result<u8> {
     args.threads.apply();
+    let is = |format| args.format == format;
+    check_applies("--components", args.components.is_some(), is(ExportFormat::Btf), "a .btf")?;
+    check_applies("--quality", args.quality.is_some(), is(ExportFormat::Ubo2003), "an archive of JPEGs")?;
+    check_applies("--exposure", args.exposure.is_some(), is(ExportFormat::Ubo2003), "an archive of JPEGs")?;
+    check_output(&args.source, &args.output, matches!(args.format, ExportFormat::Exr | ExportFormat::Png))?;
     let progress = Progress::new();
     // A file is expanded beside the result, on disk.
     let place;
@@ -202,7 +215,7 @@ fn export(args: ExportArgs) -> Result<u8> {
         ExportFormat::Exr => count_cut(images::export(&dataset, &args.output, images::Format::Exr, MEMORY, &writing)?),
         ExportFormat::Png => count_cut(images::export(&dataset, &args.output, images::Format::Png, MEMORY, &writing)?),
         ExportFormat::Ubo2003 => {
-            let options = ubo::Options { quality: args.quality, exposure: args.exposure as f32, memory: MEMORY };
+            let options = ubo::Options { quality: args.quality.unwrap_or(95), exposure: args.exposure.unwrap_or(1.0), memory: MEMORY };
             let exported = ubo::export(&dataset, &args.output, &options, &writing)?;
             count_cut(exported.cut);
             if let (count @ 1.., worst) = exported.moved {
@@ -210,7 +223,10 @@ fn export(args: ExportArgs) -> Result<u8> {
             }
         }
         ExportFormat::Btf => {
-            let rms = btf::write::export(&dataset, &args.output, args.components as usize)?;
+            let rms = btf::write::export(&dataset, &args.output, args.components.unwrap_or(100) as usize)?;
+            if dataset.description().lights.len() != dataset.description().views.len() {
+                notes.push("there are not as many lights as views, which readers made with btf.hh refuse".into());
+            }
             notes.push(format!("the components leave an RMS error of {rms:.3e} of linear radiance"));
         }
     }
@@ -222,15 +238,42 @@ fn export(args: ExportArgs) -> Result<u8> {
 /// Bytes of images held at once.
 const MEMORY: usize = 256 << 20;
 
+/// Refuses an option that would do nothing.
+fn check_applies(option: &str, is_given: bool, applies: bool, to: &str) -> Result<()> {
+    if is_given && !applies { Err(ToolError::Usage(format!("{option} is for {to} alone"))) } else { Ok(()) }
+}
+
+/// Refuses an output that could not be written after hours of work, or would take the place of its source.
+fn check_output(source: &Path, output: &Path, is_folder: bool) -> Result<()> {
+    let refuse = |why: &str| Err(ToolError::Usage(format!("{}: {why}", output.display())));
+    if !is_folder && output.is_dir() {
+        return refuse("this is a folder; a file is written");
+    }
+    let same = |a: &Path, b: &Path| a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
+    if same(source, output) {
+        return refuse("this is the source");
+    }
+    Ok(())
+}
+
+/// Whether the light's cosine is in values.
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum Cosine {
+    /// Values contain it, as radiance does
+    Included,
+    /// Values do not contain it
+    Excluded,
+}
+
 /// Options of importing what becomes a dataset.
 #[derive(Args)]
 pub struct DataArgs {
     /// Keep 32-bit floats instead of binary16
     #[arg(long)]
     float: bool,
-    /// Values do not contain the cosine of the light's angle, where the data do not say
-    #[arg(long)]
-    without_cosine: bool,
+    /// Whether values contain the cosine of the light's angle; if not given, as the data say, and if they do not, included
+    #[arg(long, value_enum)]
+    cosine: Option<Cosine>,
     /// Name of the material; that of the file or folder if not given
     #[arg(long)]
     name: Option<String>,
@@ -240,14 +283,16 @@ pub struct DataArgs {
     /// Licence of the data
     #[arg(long, default_value = "")]
     licence: String,
-    /// What three numbers of an image are; auto takes channels X, Y, Z of an EXR as CIE XYZ
-    #[arg(long, value_enum, default_value = "auto")]
-    colours: Colours,
+    /// What three numbers of an image are, auto if not given: channels X, Y, Z of an EXR are CIE XYZ
+    #[arg(long, value_enum)]
+    colours: Option<Colours>,
     /// Bytes for images that are held at once, in MB; a larger single image is refused
-    #[arg(long, default_value_t = 256, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    memory: u32,
-    /// Write the height map of a .btf, as .exr or .png
-    #[arg(long)]
+    ///
+    /// The more, the longer the runs that are written: 1000 if not given
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    memory: Option<u32>,
+    /// Write the height map of a .btf, its numbers as they are, as .exr
+    #[arg(long, value_parser = parse_exr)]
     height_map: Option<PathBuf>,
     /// Tell how long each step took
     #[arg(long)]
@@ -256,36 +301,63 @@ pub struct DataArgs {
     threads: Threads,
 }
 
+impl DataArgs {
+    /// What a folder of SparseBTF does not take: its files become a finished file as they are.
+    pub fn check_unused(&self) -> Result<()> {
+        let given = [
+            ("--float", self.float),
+            ("--cosine", self.cosine.is_some()),
+            ("--name", self.name.is_some()),
+            ("--origin", !self.origin.is_empty()),
+            ("--licence", !self.licence.is_empty()),
+            ("--colours", self.colours.is_some()),
+            ("--memory", self.memory.is_some()),
+            ("--height-map", self.height_map.is_some()),
+            ("--times", self.times),
+        ];
+        given.into_iter().try_for_each(|(option, is_given)| check_applies(option, is_given, false, "what becomes a dataset"))
+    }
+}
+
 /// Makes a dataset of what others have.
 pub fn import_data(from: &Path, kind: Kind, output: &Path, args: DataArgs) -> Result<()> {
     args.threads.apply();
-    let of_path = || from.file_stem().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let is_btf = kind == Kind::Btf;
+    check_applies("--height-map", args.height_map.is_some(), is_btf, "a .btf")?;
+    check_applies("--colours", args.colours.is_some(), !is_btf, "pictures")?;
+    check_applies("--memory", args.memory.is_some(), !is_btf, "pictures")?;
+    check_output(from, output, false)?;
+    let texts = [("--name", args.name.as_deref().unwrap_or_default()), ("--origin", &args.origin), ("--licence", &args.licence)];
+    if let Some((option, _)) = texts.iter().find(|(_, text)| text.chars().any(selvedge::metadata::is_invisible)) {
+        return Err(ToolError::Usage(format!("{option}: a character that is not seen, which no file may have")));
+    }
+    let of_path = || from.file_stem().map_or_else(String::new, |name| foreign::clean(&name.to_string_lossy()));
     let mut options = ImportOptions {
         sample: if args.float { Sample::Float } else { Sample::Half },
-        cosine_included: !args.without_cosine,
+        cosine_included: args.cosine.map(|cosine| cosine == Cosine::Included),
         name: args.name.unwrap_or_default(),
         origin: args.origin,
         licence: args.licence,
-        memory: (args.memory as usize) << 20,
-        colours: args.colours,
+        memory: args.memory.map_or(ImportOptions::default().memory, |mb| mb as usize * 1_000_000),
+        colours: args.colours.unwrap_or_default(),
     };
-    if args.height_map.is_some() && kind != Kind::Btf {
-        return Err(ToolError::Usage("--height-map: only a .btf has one".into()));
-    }
     let progress = Progress::new();
     let tell = |done, all| progress.tell("reading", done, all);
     let imported = match kind {
         Kind::Btf => {
             let btf = btf::Btf::open(from)?;
-            if let Some(path) = &args.height_map {
-                let heights = btf.height_map()?;
-                let [width, height] = btf.head().height_map.unwrap_or_default().map(|n| n as usize);
-                picture::Picture::from_fn(width, height, |x, y| [heights[y * width + x]; 3]).save(path)?;
-            }
+            // Before the long work, as far as it can fail.
+            let heights = args.height_map.as_ref().map(|path| Ok((path, btf.height_map()?))).transpose()?;
             if options.name.is_empty() {
                 options.name = of_path();
             }
-            foreign::import_btf(&btf, output, &options, &tell)?
+            let imported = foreign::import_btf(&btf, output, &options, &tell)?;
+            if let Some((path, heights)) = heights {
+                check_output(output, path, false)?;
+                let [width, height] = btf.head().height_map.unwrap_or_default().map(|n| n as usize);
+                picture::Picture::from_fn(width, height, |x, y| [heights[y * width + x]; 3]).save(path)?;
+            }
+            imported
         }
         _ => {
             let set = images::ImageSet::open(from, options.memory)?;

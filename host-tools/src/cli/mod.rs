@@ -43,9 +43,9 @@ enum Command {
         /// SparseBTF: blocks along x and y, if the image is not square, as 40x30
         #[arg(long, value_parser = parse_blocks)]
         blocks: Option<[usize; 2]>,
-        /// SparseBTF: bits of a quantised coefficient, 1 to 16
-        #[arg(long, default_value_t = demo::VALUE_BITS, value_parser = clap::value_parser!(u32).range(1..=16))]
-        value_bits: u32,
+        /// SparseBTF: bits of a quantised coefficient, 1 to 16; 10 if not given
+        #[arg(long, value_parser = clap::value_parser!(u32).range(1..=16))]
+        value_bits: Option<u32>,
         /// The dataset (.selvset) to write, or of SparseBTF the file (.selv)
         #[arg(short, long)]
         output: PathBuf,
@@ -228,7 +228,7 @@ fn parse_severity(text: &str) -> std::result::Result<(String, validate::Severity
     Ok((rule.into(), severity.parse()?))
 }
 
-fn parse_exposure(text: &str) -> std::result::Result<f32, String> {
+pub(crate) fn parse_exposure(text: &str) -> std::result::Result<f32, String> {
     text.parse().ok().filter(|f: &f32| f.is_finite() && *f > 0.0).ok_or_else(|| "a positive number".into())
 }
 
@@ -355,8 +355,22 @@ fn run(cli: Cli) -> Result<u8> {
         Command::Material(command) => commands::run(command),
         Command::Measuring(command) => measuring::run(command),
         Command::Import { source, material, blocks, value_bits, output, dictionary, data } => match foreign::detect(&source)? {
-            Kind::SparseBtf => import(&source, material, blocks, value_bits, &output, dictionary.as_deref()).map(|()| 0),
-            kind @ (Kind::Btf | Kind::Zip | Kind::Folder) => commands::import_data(&source, kind, &output, data).map(|()| 0),
+            Kind::SparseBtf => {
+                data.check_unused()?;
+                import(&source, material, blocks, value_bits.unwrap_or(demo::VALUE_BITS), &output, dictionary.as_deref()).map(|()| 0)
+            }
+            kind @ (Kind::Btf | Kind::Zip | Kind::Folder) => {
+                let of_sparse = [
+                    ("--material", material.is_some()),
+                    ("--blocks", blocks.is_some()),
+                    ("--value-bits", value_bits.is_some()),
+                    ("--dictionary", dictionary.is_some()),
+                ];
+                match of_sparse.iter().find(|(_, is_given)| *is_given) {
+                    Some((option, _)) => Err(ToolError::Usage(format!("{option} is for folders of SparseBTF alone"))),
+                    None => commands::import_data(&source, kind, &output, data).map(|()| 0),
+                }
+            }
             kind => Err(ToolError::Usage(format!("{}: this is a {kind} already", source.display()))),
         },
         Command::Info { source, json } => tell_info(&source, json),
@@ -426,7 +440,9 @@ pub fn main() -> ExitCode {
     match run(cli) {
         Ok(code) => ExitCode::from(code),
         Err(error) => {
-            eprintln!("selvedge: {error}");
+            // Names inside files of others may hold what a terminal would obey.
+            let words: String = error.to_string().chars().map(|c| if c != '\n' && selvedge::metadata::is_invisible(c) { '\u{fffd}' } else { c }).collect();
+            eprintln!("selvedge: {words}");
             ExitCode::from(error.exit_code())
         }
     }

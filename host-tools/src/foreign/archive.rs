@@ -83,6 +83,9 @@ impl Archive {
         let path = bytes.path().to_owned();
         let bad = |what: String| ToolError::Foreign { path: path.clone(), offset: 0, what };
         let zip = zip::ZipArchive::new(Positioned { bytes: Arc::new(bytes), at: 0 }).map_err(|error| bad(error.to_string()))?;
+        if zip.len() > MOST_ENTRIES {
+            return Err(bad(format!("{} entries; {MOST_ENTRIES} are possible", zip.len())));
+        }
         let mut numbers = BTreeMap::new();
         for number in 0..zip.len() {
             let name = zip.name_for_index(number).map(|name| name.map_err(|error| bad(error.to_string()))).transpose()?.unwrap_or_default();
@@ -117,6 +120,22 @@ impl Archive {
         names.retain(|name| !name.components().any(|part| part.as_os_str().as_encoded_bytes().starts_with(b".")));
         names.sort();
         Ok(names)
+    }
+
+    /// Whether it has a file.
+    pub fn has(&self, name: &Path) -> bool {
+        match self {
+            Archive::Folder(folder) => folder.join(name).is_file(),
+            Archive::Zip { numbers, .. } => numbers.contains_key(name),
+        }
+    }
+
+    /// How deep a file that lists the others may be: in the folder itself, or in the folder that a zip archive was made of.
+    pub fn depth_of_listing(&self) -> usize {
+        match self {
+            Archive::Folder(_) => 1,
+            Archive::Zip { .. } => 2,
+        }
     }
 
     /// What errors call a file of it.
@@ -164,8 +183,11 @@ fn walk(folder: &Path, below: &Path, depth: usize, names: &mut Vec<PathBuf>) -> 
         let Ok(kind) = std::fs::metadata(entry.path()) else { continue };
         if kind.is_dir() {
             // A link to a folder above would never end.
-            if depth == 0 || entry.file_type().is_ok_and(|kind| kind.is_symlink()) {
+            if entry.file_type().is_ok_and(|kind| kind.is_symlink()) {
                 continue;
+            }
+            if depth == 0 {
+                return Err(ToolError::Usage(format!("{}: folders in folders, more than {DEPTH} deep", folder.join(name).display())));
             }
             walk(folder, &name, depth - 1, names)?;
         } else if kind.is_file() {

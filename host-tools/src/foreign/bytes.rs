@@ -179,7 +179,7 @@ impl Cursor<'_> {
         self.bytes.read_at(start, &mut bytes)?;
         let text = String::from_utf8_lossy(&bytes);
         let text = text.split('\0').next().unwrap_or_default();
-        Ok(text.chars().filter(|&c| !selvedge::metadata::is_invisible(c)).take(200).collect::<String>().trim().to_owned())
+        Ok(super::clean(text))
     }
 
     /// Goes on behind `length` bytes, which must be there.

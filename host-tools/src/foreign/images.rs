@@ -23,7 +23,7 @@
 use super::archive::Archive;
 use super::pixels::{self, to_srgb};
 use super::{ImportOptions, Imported};
-use crate::dataset::{Dataset, Description, Sample, Writer};
+use crate::dataset::{Dataset, Description, MOST_DIRECTIONS, Sample, Writer, first_beyond};
 use crate::directions::{from_degrees, grid, to_degrees};
 use crate::error::{Result, ToolError};
 use crate::files;
@@ -31,19 +31,21 @@ use exr::prelude::{Image, IntoSample, SpecificChannels, Vec2, WritableImage as _
 use glam::DVec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
+use std::io::Read as _;
 use std::path::{Component, Path, PathBuf};
 
 /// The file that may list the images.
 const LISTING: &str = "dataset.json";
 /// Directions closer than this are the same, in degrees.
 pub const SAME_DEGREES: f64 = 0.01;
-/// The dataset's own limit, checked before anything of such a size is held.
-const MOST_DIRECTIONS: usize = 1024;
-/// Bytes per texel of an image held while others are decoded, and while it is encoded.
-const IMPORT_BYTES: usize = pixels::PIXEL_BYTES;
+/// Bytes per texel of an image that is held, and of one while it is encoded.
+const IMPORT_BYTES: usize = 12;
 const EXPORT_BYTES: usize = 12 + 12;
-/// Bytes that a single image may take in any case.
+/// Bytes that a single image may take in any case, and beyond its pixels: for text and thumbnails.
 const SINGLE: usize = 1 << 20;
+/// Images decoded at once before the first error is looked for.
+const WAVE: usize = 64;
 /// Endings of names that are images.
 const ENDINGS: [&str; 5] = ["exr", "png", "jpg", "jpeg", "hdr"];
 
@@ -85,7 +87,6 @@ pub struct ImageSet {
     /// Names of the images in the dataset's order of pairs.
     names: Vec<PathBuf>,
     description: Description,
-    is_listed: bool,
 }
 
 impl ImageSet {
@@ -104,17 +105,21 @@ impl ImageSet {
     /// As [`ImageSet::open`].
     pub fn of(archive: Archive, memory: usize) -> Result<ImageSet> {
         let path = &archive.path().to_owned();
-        let listing = path.join(LISTING);
-        let is_listed = matches!(archive, Archive::Folder(_)) && listing.try_exists().map_err(ToolError::io(&listing))?;
-        let mut listing: Listing = match is_listed {
-            true => serde_json::from_slice(&files::read(&listing)?).map_err(|error| bad(&listing, error.to_string()))?,
-            false => Listing::default(),
-        };
-        let entries = find(&archive, listing.images.take())?;
+        let memory = memory.max(SINGLE);
+        let mut listing = Listing::default();
+        // Of a folder that was packed whole, the archive has the folder.
+        let place = archive.names()?.into_iter().find(|name| name.ends_with(LISTING) && name.components().count() <= archive.depth_of_listing());
+        if let Some(name) = &place {
+            let mut bytes = Vec::new();
+            let file = archive.describe(name);
+            archive.read(name, memory)?.read_to_end(&mut bytes).map_err(ToolError::io(&file))?;
+            listing = serde_json::from_slice(&bytes).map_err(|error| bad(&file, error.to_string()))?;
+        }
+        let below = place.as_deref().and_then(Path::parent).unwrap_or(Path::new(""));
+        let entries = find(&archive, below, listing.images.take())?;
         let lights = set_of("light", path, listing.lights, entries.iter().map(|entry| entry.light))?;
         let views = set_of("view", path, listing.views, entries.iter().map(|entry| entry.view))?;
         let names: Vec<PathBuf> = arrange(path, &entries, &lights, &views)?.into_iter().map(Path::to_owned).collect();
-        let memory = memory.max(SINGLE);
         let first = pixels::open(archive.read(&names[0], memory)?, memory).map_err(|what| bad(&archive.describe(&names[0]), what))?;
         let description = Description {
             size: first.size,
@@ -125,7 +130,7 @@ impl ImageSet {
             texel_nm: listing.texel_nm,
             texts: [listing.name, listing.origin, listing.licence],
         };
-        Ok(ImageSet { is_listed: listing.cosine_included.is_some(), archive, names, description })
+        Ok(ImageSet { archive, names, description })
     }
 
     /// What the set says of itself.
@@ -140,23 +145,22 @@ impl ImageSet {
     /// dataset then.
     pub fn import(&self, output: &Path, options: &ImportOptions, progress: &dyn Fn(usize, usize)) -> Result<Imported> {
         let size = self.description.size;
-        let mut description = options.describe(&self.description);
-        if self.is_listed {
-            description.cosine_included = self.description.cosine_included;
-        }
-        let writer = Writer::create(output, description)?;
+        let writer = Writer::create(output, options.describe(&self.description))?;
         let (texels, pairs) = (size[0] * size[1], self.names.len());
         let batch = (options.memory / (texels * IMPORT_BYTES)).clamp(1, pairs);
         let (mut negative, mut first) = (0, 0);
         while first < pairs {
             let count = batch.min(pairs - first);
-            // All results are kept, so that the error is that of the first bad image, whichever thread was first.
-            let decoded: Vec<Result<(Vec<[f32; 3]>, u64)>> = (first..first + count).into_par_iter().map(|pair| self.image(pair, options)).collect();
             let mut images = Vec::with_capacity(count);
-            for result in decoded {
-                let (image, cut) = result?;
-                negative += cut;
-                images.push(image);
+            for wave in (first..first + count).step_by(WAVE) {
+                // All results are kept, so that the error is that of the first bad image, whichever thread was first.
+                let decoded: Vec<Result<(Vec<[f32; 3]>, u64)>> =
+                    (wave..(wave + WAVE).min(first + count)).into_par_iter().map(|pair| self.image(pair, options)).collect();
+                for result in decoded {
+                    let (image, cut) = result?;
+                    negative += cut;
+                    images.push(image);
+                }
             }
             (0..texels).into_par_iter().try_for_each_init(Vec::new, |run, texel| {
                 run.clear();
@@ -166,18 +170,19 @@ impl ImageSet {
             first += count;
             progress(first, pairs);
         }
-        let notes = if negative == 0 { Vec::new() } else { vec![format!("{negative} values of colours outside of RGB were negative and are 0 now")] };
+        let notes = if negative == 0 { Vec::new() } else { vec![format!("{negative} values were negative, as of colours outside of RGB; they are 0 now")] };
         Ok(Imported { statistics: writer.finish()?, notes })
     }
 
-    /// The linear pixels of a pair's image, row by row, and how many negative values of colours outside of RGB became 0.
+    /// The linear pixels of a pair's image, row by row, and how many negative values became 0.
     ///
     /// # Errors
     /// If it is damaged, not of the first one's size, or has a number that is no radiance, with the file and the pixel.
     pub fn image(&self, pair: usize, options: &ImportOptions) -> Result<(Vec<[f32; 3]>, u64)> {
         let (size, name) = (self.description.size, &self.names[pair]);
         let path = || self.archive.describe(name);
-        let memory = options.memory.max(SINGLE);
+        // As large as the first, and no more: many threads do this at once.
+        let memory = (size[0] * size[1] * pixels::PIXEL_BYTES + SINGLE).min(options.memory.max(SINGLE));
         let opened = pixels::open(self.archive.read(name, memory)?, memory).map_err(|what| bad(&path(), what))?;
         if opened.size != size {
             let first = self.archive.describe(&self.names[0]);
@@ -185,21 +190,20 @@ impl ImageSet {
             let what = format!("{width} x {height} pixels, where the first image, {}, has {} x {}", first.display(), size[0], size[1]);
             return Err(bad(&path(), what));
         }
-        let is_xyz = opened.is_xyz(options.colours);
         let mut pixels = opened.pixels(options.colours).map_err(|what| bad(&path(), what))?;
         let mut negative = 0;
-        if is_xyz {
-            // Colours that sRGB does not have. Infinities and NaN are left to be refused.
-            pixels.as_flattened_mut().iter_mut().filter(|v| **v < 0.0 && v.is_finite()).for_each(|v| {
-                *v = 0.0;
-                negative += 1;
-            });
-        }
-        let largest = if options.sample == Sample::Half { f16::MAX.to_f32() } else { f32::MAX };
-        match pixels.as_flattened().iter().position(|v| !(0.0..=largest).contains(v)) {
+        // Colours that sRGB does not have, and noise about black. Infinities and NaN are left to be refused.
+        pixels.as_flattened_mut().iter_mut().filter(|v| **v < 0.0 && v.is_finite()).for_each(|v| {
+            *v = 0.0;
+            negative += 1;
+        });
+        let largest = options.sample.largest();
+        match first_beyond(pixels.as_flattened(), largest) {
             Some(i) => {
+                let value = pixels[i / 3][i % 3];
+                let hint = if value.is_finite() && options.sample == Sample::Half { "; --float holds it" } else { "" };
                 let (x, y, channel) = (i / 3 % size[0], i / 3 / size[0], ["red", "green", "blue"][i % 3]);
-                Err(bad(&path(), format!("pixel ({x}, {y}), {channel}: {} is not a radiance from 0 to {largest:e}", pixels[i / 3][i % 3])))
+                Err(bad(&path(), format!("pixel ({x}, {y}), {channel}: {value} is not a radiance from 0 to {largest:e}{hint}")))
             }
             None => Ok((pixels, negative)),
         }
@@ -290,17 +294,19 @@ fn is_image(path: &Path) -> bool {
 }
 
 /// The images of the listing, or of the archive in the order of their names, with sound angles.
-fn find(archive: &Archive, listed: Option<Vec<Entry>>) -> Result<Vec<Entry>> {
+fn find(archive: &Archive, below: &Path, listed: Option<Vec<Entry>>) -> Result<Vec<Entry>> {
     let mut entries = Vec::new();
     if let Some(listed) = listed {
-        for entry in listed {
+        for mut entry in listed {
             // A listing from elsewhere reads nothing outside its folder.
             if entry.file.components().any(|part| !matches!(part, Component::Normal(_))) {
                 return Err(bad(&archive.describe(Path::new(LISTING)), format!("{}: not a path inside the folder", entry.file.display())));
             }
+            entry.file = below.join(&entry.file);
             // Before hours of reading the others.
-            let file = archive.describe(&entry.file);
-            std::fs::metadata(&file).map_err(ToolError::io(&file))?;
+            if !archive.has(&entry.file) {
+                return Err(bad(&archive.describe(&entry.file), "there is no such file"));
+            }
             entries.push(entry);
         }
     } else {
@@ -388,16 +394,23 @@ fn set_of(what: &str, folder: &Path, listed: Vec<DVec3>, angles: impl Iterator<I
 
 /// The file of every pair in the dataset's order.
 fn arrange<'a>(folder: &Path, entries: &'a [Entry], lights: &[DVec3], views: &[DVec3]) -> Result<Vec<&'a Path>> {
-    let nearest = |entry: &Entry, what: &str, set: &[DVec3], [polar, azimuth]: [f64; 2]| {
-        let distance = |i: usize| degrees_between(set[i], from_degrees(polar, azimuth));
+    let nearest = |set: &[DVec3], [polar, azimuth]: [f64; 2]| {
+        let asked = from_degrees(polar, azimuth);
+        let distances = set.iter().map(|&other| degrees_between(other, asked)).enumerate();
         // An image's direction may be this far from the one that stands for it, and that one as far from a grid's.
-        let index = (0..set.len()).min_by(|&a, &b| distance(a).total_cmp(&distance(b))).filter(|&i| distance(i) <= 2.0 * SAME_DEGREES);
-        index.ok_or_else(|| bad(&folder.join(&entry.file), format!("{what} at ({polar}, {azimuth}) degrees is none of those that {LISTING} has")))
+        distances.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|&(_, distance)| distance <= 2.0 * SAME_DEGREES).map(|(i, _)| i)
+    };
+    // The same angles come in thousands of names.
+    let mut known: [HashMap<[u64; 2], Option<usize>>; 2] = Default::default();
+    let mut find = |entry: &Entry, side: usize| {
+        let (what, set, angles) = if side == 0 { ("light", lights, entry.light) } else { ("view", views, entry.view) };
+        let index = *known[side].entry(angles.map(f64::to_bits)).or_insert_with(|| nearest(set, angles));
+        index.ok_or_else(|| bad(&folder.join(&entry.file), format!("{what} at ({}, {}) degrees is none of those that {LISTING} has", angles[0], angles[1])))
     };
     let mut files: Vec<Option<&Path>> = vec![None; lights.len() * views.len()];
     for entry in entries {
-        let light = nearest(entry, "light", lights, entry.light)?;
-        let view = nearest(entry, "view", views, entry.view)?;
+        let light = find(entry, 0)?;
+        let view = find(entry, 1)?;
         if let Some(other) = files[view * lights.len() + light].replace(&entry.file) {
             return Err(bad(&folder.join(&entry.file), format!("the same pair of directions as {}", other.display())));
         }

@@ -16,7 +16,7 @@ pub mod images;
 pub mod pixels;
 pub mod ubo;
 
-use crate::dataset::{Dataset, Description, Sample, Statistics, Writer};
+use crate::dataset::{Dataset, Description, Sample, Statistics, Writer, first_beyond};
 use crate::error::{Result, ToolError};
 use crate::linear::ordered;
 use crate::{directions, inspect, sparsebtf};
@@ -35,8 +35,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 pub struct ImportOptions {
     /// How values are stored.
     pub sample: Sample,
-    /// Values contain the cosine of the light's angle; what the data say goes first.
-    pub cosine_included: bool,
+    /// Whether values contain the cosine of the light's angle; if it is not said, as the data say, and if they do not, yes.
+    pub cosine_included: Option<bool>,
     /// Name of the material; if empty, that of the data.
     pub name: String,
     /// Origin of the data; if empty, that of the data.
@@ -52,7 +52,7 @@ pub struct ImportOptions {
 impl Default for ImportOptions {
     fn default() -> ImportOptions {
         let [name, origin, licence] = Default::default();
-        ImportOptions { sample: Sample::Half, cosine_included: true, name, origin, licence, memory: 256 << 20, colours: Colours::Auto }
+        ImportOptions { sample: Sample::Half, cosine_included: None, name, origin, licence, memory: 1 << 30, colours: Colours::Auto }
     }
 }
 
@@ -60,9 +60,15 @@ impl ImportOptions {
     /// A description of data, completed by what the user says.
     fn describe(&self, found: &Description) -> Description {
         let asked = [&self.name, &self.origin, &self.licence];
-        let texts = std::array::from_fn(|i| if asked[i].is_empty() { found.texts[i].clone() } else { asked[i].clone() });
-        Description { sample: self.sample, cosine_included: self.cosine_included, texts, ..found.clone() }
+        let texts = std::array::from_fn(|i| if asked[i].is_empty() { clean(&found.texts[i]) } else { asked[i].clone() });
+        let cosine_included = self.cosine_included.unwrap_or(found.cosine_included);
+        Description { sample: self.sample, cosine_included, texts, ..found.clone() }
     }
+}
+
+/// A text of others as a file may have it (3.4-3): without what is not seen, and not long.
+pub fn clean(text: &str) -> String {
+    text.chars().filter(|&c| !selvedge::metadata::is_invisible(c)).take(200).collect::<String>().trim().to_owned()
 }
 
 /// What came of an import.
@@ -138,9 +144,8 @@ pub fn detect(path: &Path) -> Result<Kind> {
 /// If the file is not as its layout says; if a value is infinite or beyond what `options.sample` holds; on I/O. There is no dataset then.
 pub fn import_btf(btf: &Btf, output: &Path, options: &ImportOptions, progress: &(dyn Fn(usize, usize) + Sync)) -> Result<Imported> {
     let head = btf.head();
-    let mut description = options.describe(&btf.description());
-    description.cosine_included = head.cosine_included.unwrap_or(options.cosine_included);
-    let writer = Writer::create(output, description)?;
+    let writer = Writer::create(output, options.describe(&btf.description()))?;
+    let largest = options.sample.largest();
     let (texels, length, batch) = (head.size[0] * head.size[1], btf.texel_len(), btf.batch());
     let done = AtomicUsize::new(0);
     let work = |i: usize| -> Result<Clipped> {
@@ -156,6 +161,17 @@ pub fn import_btf(btf: &Btf, output: &Path, options: &ImportOptions, progress: &
             *v = 0.0;
         });
         for (i, texel) in values.chunks(length).enumerate() {
+            if let Some(n) = first_beyond(texel, largest) {
+                let (texel_number, [x, y]) = (first + i, [(first + i) % head.size[0], (first + i) / head.size[0]]);
+                let hint = if texel[n].is_finite() && options.sample == Sample::Half { "; --float holds it" } else { "" };
+                let what = format!(
+                    "texel ({x}, {y}), light {}, view {}: {} is not a radiance from 0 to {largest:e}{hint}",
+                    n / 3 % head.lights.len(),
+                    n / 3 / head.lights.len(),
+                    texel[n]
+                );
+                return Err(ToolError::Foreign { path: btf.path().to_owned(), offset: btf.offset(texel_number), what });
+            }
             writer.put(first + i, 0, texel)?;
         }
         progress(done.fetch_add(count, Ordering::Relaxed) + count, texels);
@@ -173,9 +189,13 @@ pub fn import_btf(btf: &Btf, output: &Path, options: &ImportOptions, progress: &
     if head.rotated > 0 {
         notes.push(format!("{} of {} frames of texels are not the identity; values stay in the frames they have", head.rotated, head.rotations));
     }
-    if head.cosine_included.is_none() {
-        let taken = if options.cosine_included { "contain" } else { "do not contain" };
-        notes.push(format!("the file does not say whether values contain the cosine of the light's angle; taken as if they {taken} it"));
+    if options.cosine_included.is_none() {
+        match head.cosine_included {
+            Some(true) => {}
+            // The flag is not to be trusted: Bonn's own library leaves it 0 for pictures, which are radiance.
+            Some(false) => notes.push("the file says that values do not contain the cosine of the light's angle; --cosine included if they do".into()),
+            None => notes.push("the file does not say whether values contain the cosine of the light's angle; taken as if they do (--cosine)".into()),
+        }
     }
     Ok(Imported { statistics: writer.finish()?, notes })
 }

@@ -11,6 +11,7 @@
 //! bottom, by the one reader that was written against the archives (2-propanol/BTF_extractor), and so they are read. Where the two numbers differ the
 //! picture is refused.
 
+use crate::dataset::MOST_TEXELS;
 use exr::prelude::{ReadChannels as _, ReadLayers as _, ReadSpecificChannel as _, Vec2};
 use image::ImageDecoder as _;
 use std::io::{BufRead, Read, Seek, SeekFrom};
@@ -18,8 +19,8 @@ use std::sync::LazyLock;
 use zune_jpeg::JpegDecoder;
 use zune_jpeg::zune_core::{bytestream::ZCursor, colorspace::ColorSpace, options::DecoderOptions};
 
-/// Most pixels along an axis: a dataset's own limit.
-const MOST_PIXELS: usize = 16_384;
+/// Most channels of a layer of an EXR.
+const MOST_CHANNELS: usize = 1024;
 /// Bytes that a pixel takes while its image is decoded: three numbers, and beside them what decoding needs.
 pub const PIXEL_BYTES: usize = 12 + 12;
 
@@ -76,11 +77,11 @@ pub fn open<'a>(mut stream: Box<dyn Stream + Send + 'a>, memory: usize) -> Resul
         _ => return Err(format!("this is no image; {KINDS}")),
     };
     let [width, height] = opened.size;
-    if opened.size.iter().any(|n| !(1..=MOST_PIXELS).contains(n)) {
-        return Err(format!("{width} x {height} pixels; 1 to {MOST_PIXELS} along an axis are possible"));
+    if opened.size.iter().any(|n| !(1..=MOST_TEXELS).contains(n)) {
+        return Err(format!("{width} x {height} pixels; 1 to {MOST_TEXELS} along an axis are possible"));
     }
-    let needed = width * height * PIXEL_BYTES;
-    if needed > memory {
+    let needed = width as u64 * height as u64 * PIXEL_BYTES as u64;
+    if needed > memory as u64 {
         return Err(format!("{width} x {height} pixels need {needed} bytes to decode; {memory} are allowed (--memory)"));
     }
     Ok(opened)
@@ -127,6 +128,15 @@ fn open_exr(stream: Box<dyn Stream + Send + '_>, memory: usize) -> Result<Opened
     };
     if colours.iter().any(|c| c.sampling != Vec2(1, 1) || c.sample_type == exr::meta::attribute::SampleType::U32) {
         return Err("the channels are subsampled or not floats".into());
+    }
+    // Sizes are products of fields, which the library does not check.
+    let is_large = |size: Vec2<usize>| size.width() > MOST_TEXELS || size.height() > MOST_TEXELS;
+    let is_sound = |header: &exr::meta::header::Header| match header.blocks {
+        exr::meta::BlockDescription::Tiles(tiles) => !is_large(tiles.tile_size) && !is_large(header.layer_size),
+        exr::meta::BlockDescription::ScanLines => !is_large(header.layer_size),
+    } && header.channels.list.len() <= MOST_CHANNELS;
+    if !reader.headers().iter().all(is_sound) {
+        return Err(format!("a layer of more than {MOST_TEXELS} pixels along an axis, or of more than {MOST_CHANNELS} channels"));
     }
     // Blocks of all layers are read, also those that nobody wants.
     let blocks = reader.headers().iter().map(exr::meta::header::Header::max_block_byte_size).max().unwrap_or(0);
@@ -193,7 +203,7 @@ fn open_jpeg(stream: Box<dyn Stream + Send + '_>, memory: usize) -> Result<Opene
         return Err(format!("more than {memory} bytes, which are allowed (--memory)"));
     }
     // Lenient readers fill what is missing with grey.
-    let options = DecoderOptions::new_safe().set_strict_mode(true).set_max_width(MOST_PIXELS).set_max_height(MOST_PIXELS);
+    let options = DecoderOptions::new_safe().set_strict_mode(true).set_max_width(MOST_TEXELS).set_max_height(MOST_TEXELS);
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
     decoder.decode_headers().map_err(|error| error.to_string())?;
     let colour = decoder.input_colorspace().unwrap_or(ColorSpace::Unknown);
@@ -243,7 +253,10 @@ fn open_radiance(mut stream: Box<dyn Stream + Send + '_>) -> Result<Opened<'_>, 
             };
         } else if let Some(factor) = text.strip_prefix("EXPOSURE=") {
             // Several lines multiply.
-            exposure *= factor.trim().parse::<f32>().ok().filter(|f| f.is_finite() && *f > 0.0).ok_or_else(|| format!("the exposure {factor:?}"))?;
+            let product = factor.trim().parse::<f32>().ok().map(|factor| exposure * factor);
+            exposure = product.filter(|f| f.is_normal() && *f > 0.0).ok_or_else(|| format!("the exposure {factor:?}"))?;
+        } else if text.starts_with("COLORCORR=") {
+            return Err("a Radiance picture with COLORCORR is not read: its colours are scaled one by one".into());
         }
     }
     let text = line()?;

@@ -112,10 +112,7 @@ pub(super) fn read_decorrelated(cursor: &mut Cursor<'_>, head: &mut Head) -> Res
     }
     let factors = (0..head.channels.len()).map(|_| read_factor(cursor, head, 1)).collect::<Result<Vec<_>>>()?;
     let components: Vec<String> = factors.iter().map(|factor| factor.components.to_string()).collect();
-    let name = ["RGB", "YUV", "", "principal axes", "YCoCg", "", "", "", "", "log Y, U, V", "log Y, log U, log V", "log Y, U/Y, V/Y", "log RGB"]
-        .get(number as usize)
-        .copied()
-        .unwrap_or_default();
+    let name = model.name();
     head.layout = format!("factorised by channel, {} components, {}, colour model {number} ({name})", components.join(" + "), bits(factors[0].width));
     Ok(Body::Full { factors, model })
 }
@@ -210,6 +207,18 @@ pub(super) fn read_store(cursor: &mut Cursor<'_>, head: &mut Head) -> Result<Bod
 }
 
 impl Body {
+    /// Where the numbers of a texel begin in the file; of several tables, in the first.
+    pub(super) fn offset(&self, head: &Head, texel: usize) -> u64 {
+        match self {
+            Body::Full { factors, .. } => factors[0].texels + (texel * factors[0].texel_rows * factors[0].components) as u64 * factors[0].width as u64,
+            Body::Views(views) => {
+                let rows = if views[0].means.is_some() { 1 } else { head.channels.len() };
+                views[0].texels + (texel * rows * views[0].components) as u64 * views[0].width as u64
+            }
+            Body::Store(store) => store.place(head, texel).unwrap_or(store.chunks.first().copied().unwrap_or(0)),
+        }
+    }
+
     /// Decodes a run of texels in one row of the file.
     pub(super) fn texels(&self, bytes: &Bytes, head: &Head, first: usize, count: usize, values: &mut [f32]) -> Result<()> {
         match self {
@@ -284,22 +293,27 @@ fn of_views(bytes: &Bytes, head: &Head, views: &[View], first: usize, count: usi
     Ok(())
 }
 
+impl Store {
+    /// Where the values of a texel begin, if it is there.
+    fn place(&self, head: &Head, texel: usize) -> Option<u64> {
+        let row = texel / head.size[0];
+        let is_there = |texel: usize| self.mask.as_ref().is_none_or(|mask| mask[texel] != 0);
+        let in_row = (row * head.size[0]..texel).filter(|&before| is_there(before)).count() as u64;
+        let index = self.before[row] as u64 + in_row;
+        let length = (head.pairs() * head.channels.len() * 2) as u64;
+        is_there(texel).then(|| self.chunks[(index / self.chunk_texels) as usize] + index % self.chunk_texels * length)
+    }
+}
+
 fn stored(bytes: &Bytes, head: &Head, store: &Store, first: usize, count: usize, values: &mut [f32]) -> Result<()> {
-    let ([width, _], channels, length) = (head.size, head.channels.len(), head.pairs() * 3);
-    let row = first / width;
-    let mut index = store.before[row] as u64;
-    let is_there = |texel: usize| store.mask.as_ref().is_none_or(|mask| mask[texel] != 0);
-    index += (row * width..first).filter(|&texel| is_there(texel)).count() as u64;
+    let (channels, length) = (head.channels.len(), head.pairs() * 3);
     for (texel, out) in (first..first + count).zip(values.chunks_mut(length)) {
-        if !is_there(texel) {
+        let Some(at) = store.place(head, texel) else {
             out.fill(0.0);
             continue;
-        }
-        let numbers = (head.pairs() * channels) as u64;
-        let at = store.chunks[(index / store.chunk_texels) as usize] + index % store.chunk_texels * numbers * 2;
-        let numbers = bytes.numbers(at, numbers, Width::Half)?;
+        };
+        let numbers = bytes.numbers(at, (head.pairs() * channels) as u64, Width::Half)?;
         out.as_chunks_mut::<3>().0.iter_mut().zip(numbers.chunks(channels)).for_each(|(rgb, n)| *rgb = std::array::from_fn(|c| n[c.min(channels - 1)]));
-        index += 1;
     }
     Ok(())
 }

@@ -1,7 +1,5 @@
 //! The colour models of the factorised formats: what three decoded numbers are in linear RGB.
 
-use serde::Serialize;
-
 /// What the writers add before a logarithm; a constant of all known readers, stated in no file.
 pub const EPSILON: f32 = 1e-5;
 /// Red, green and blue from Y, U, V.
@@ -10,8 +8,7 @@ const YUV: [[f32; 3]; 3] = [[1.0, 0.0, 1.13983], [1.0, -0.39465, -0.5806], [1.0,
 const YCOCG: [[f32; 3]; 3] = [[1.0, 1.0, -1.0], [1.0, 0.0, 1.0], [1.0, -1.0, -1.0]];
 
 /// A colour model, by its number in the file.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Model {
     /// 0: linear RGB.
     Rgb,
@@ -60,6 +57,20 @@ impl Model {
             5 | 6 => return Err(format!("colour model {number} (spectral) is not read: a material here has three colours")),
             _ => return Err(format!("colour model {number} is not known; 0, 1, 3, 4, 9, 10, 11 and 12 are read")),
         })
+    }
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Model::Rgb => "RGB",
+            Model::Yuv => "YUV",
+            Model::Pca { .. } => "principal axes",
+            Model::YCoCg => "YCoCg",
+            Model::LogYUv => "log Y, U, V",
+            Model::LogYLogUv => "log Y, log U, log V",
+            Model::LogYRatioUv => "log Y, U/Y, V/Y",
+            Model::LogRgb => "log RGB",
+        }
     }
 
     /// Linear RGB, which may be negative where a factorisation undershoots.

@@ -9,11 +9,12 @@
 //!
 //! The layouts are documented nowhere but in their readers, which differ. What is done here:
 //!
-//! * **Rows.** Row 0 of a factor is the *lowest* row of the picture, and here the top one comes first, so rows are swapped, as the C++ reader does
-//!   (zeroeffects/btf; the MATLAB one, cgbonn/btflib, leaves them).
+//! * **Rows.** Row 0 of a factor is the top row of the picture, as Bonn's own library has it (cgbonn/btflib, which also makes such files of pictures).
+//!   The C++ reader (zeroeffects/btf) turns rows, for pictures that begin at the bottom.
 //! * **Model 11.** `U = u (Y + e)`, as btflib has it; `btf.hh` computes `u Y + e` and cuts RGB at 1.
 //! * **Directions.** The light list stands once for each view; the first counts and the others must be of its length.
 //! * **Arrangement.** Factors may have pairs of directions as rows (usual), or texels (btflib alone reads those).
+//! * **Channels.** Three are R, G and B by their names; others are spectral and refused. A single one is grey.
 //! * **Rotations** are a frame for each texel, or none. Values stay in the frames they have, as in both readers; frames that are not the identity are told.
 //! * **Negative values**, which factorisations of dark materials have, become zero and are counted.
 //!
@@ -25,6 +26,7 @@ pub mod colour;
 pub mod write;
 
 use super::bytes::{Bytes, Cursor};
+use crate::dataset::{MOST_DIRECTIONS, MOST_TEXELS};
 use crate::error::{Result, ToolError};
 use body::Body;
 use glam::DVec3;
@@ -35,9 +37,6 @@ use std::path::Path;
 const SIGNATURES: [&str; 7] = ["!DFMF08FCR", "!FMF12FCER", "!FMF06FCR", "!FMF06FC", "!PVF06FCR", "!PVF06FC", "!BDIF06R2!"];
 /// In place of the meta block's length: the older layout of `PVF`.
 const OLD_VIEWS: u32 = 301_074;
-/// Most directions and texels along an axis, those of a dataset.
-const MOST_DIRECTIONS: u32 = 1024;
-const MOST_PIXELS: u32 = 16_384;
 /// Most channels whose names are read.
 const MOST_CHANNELS: u32 = 4096;
 
@@ -171,23 +170,32 @@ impl Btf {
         ((1 << 22) / self.texel_len()).clamp(1, 256).min(self.head.size[0] * self.head.size[1])
     }
 
-    /// Decodes `count` texels, `[texel][view][light][colour]`, from texel `first` on; rows begin at the top. Values may be negative or not finite.
+    /// Decodes `count` texels, `[texel][view][light][colour]`, from texel `first` on; rows from the top. Values may be negative or not finite.
     ///
     /// # Errors
     /// If a number of the file is not finite, and on I/O.
     pub fn texels(&self, first: usize, count: usize, values: &mut [f32]) -> Result<()> {
-        let ([width, height], length) = (self.head.size, self.texel_len());
+        let ([width, _], length) = (self.head.size, self.texel_len());
         let mut done = 0;
         while done < count {
-            let (x, y) = ((first + done) % width, (first + done) / width);
-            let run = (width - x).min(count - done);
-            self.body.texels(&self.bytes, &self.head, (height - 1 - y) * width + x, run, &mut values[done * length..][..run * length])?;
+            let run = (width - (first + done) % width).min(count - done);
+            self.body.texels(&self.bytes, &self.head, first + done, run, &mut values[done * length..][..run * length])?;
             done += run;
         }
         Ok(())
     }
 
-    /// The height map, top row first, as it is stored: the layout states no unit.
+    /// Where the numbers of a texel begin in the file.
+    pub fn offset(&self, texel: usize) -> u64 {
+        self.body.offset(&self.head, texel)
+    }
+
+    /// Where the file is.
+    pub fn path(&self) -> &Path {
+        self.bytes.path()
+    }
+
+    /// The height map, `[row][column]`, as it is stored: the layout states no unit.
     ///
     /// # Errors
     /// If the file has none or a height is not finite, and on I/O.
@@ -195,8 +203,7 @@ impl Btf {
         let Some([width, height]) = self.head.height_map else {
             return Err(ToolError::Usage(format!("{}: there is no height map", self.bytes.path().display())));
         };
-        let rows = self.bytes.numbers(self.heights, width as u64 * height as u64, super::bytes::Width::Half)?;
-        Ok(rows.chunks(width as usize).rev().flatten().copied().collect())
+        self.bytes.numbers(self.heights, width as u64 * height as u64, super::bytes::Width::Half)
     }
 }
 
@@ -235,9 +242,18 @@ fn read_meta(cursor: &mut Cursor<'_>, head: &mut Head) -> Result<()> {
     if cursor.at != start + length as u64 {
         return cursor.bytes.fail(start, format!("a meta block of {length} bytes; its fields take {}", cursor.at - start));
     }
-    if ![1, 3].contains(&head.channels.len()) {
+    let is_rgb = head.channels.iter().map(|name| name.to_ascii_uppercase()).eq(["R", "G", "B"]);
+    if head.channels.len() != 1 && !is_rgb {
         let shown: Vec<&str> = head.channels.iter().map(String::as_str).take(4).collect();
-        return cursor.bytes.fail(start, format!("{} channels ({}, ...) are spectral data; RGB and grey are read", head.channels.len(), shown.join(", ")));
+        return cursor.bytes.fail(
+            start,
+            format!(
+                "the {} channels {}{} are not read; R, G, B and a single one are",
+                head.channels.len(),
+                shown.join(", "),
+                if head.channels.len() > 4 { ", ..." } else { "" }
+            ),
+        );
     }
     Ok(())
 }
@@ -245,7 +261,7 @@ fn read_meta(cursor: &mut Cursor<'_>, head: &mut Head) -> Result<()> {
 fn read_directions(cursor: &mut Cursor<'_>, head: &mut Head) -> Result<()> {
     let limited = |cursor: &mut Cursor<'_>, what: &str| -> Result<u32> {
         let count = cursor.u32(what)?;
-        if count == 0 || count > MOST_DIRECTIONS {
+        if count == 0 || count as usize > MOST_DIRECTIONS {
             return cursor.fail(4, format!("{count} {what}; 1 to {MOST_DIRECTIONS} are possible"));
         }
         Ok(count)
@@ -281,8 +297,8 @@ fn read_direction(cursor: &mut Cursor<'_>, what: &str) -> Result<DVec3> {
 
 fn read_size(cursor: &mut Cursor<'_>, head: &mut Head) -> Result<()> {
     let size = [cursor.u32("width")?, cursor.u32("height")?];
-    if size.iter().any(|n| !(1..=MOST_PIXELS).contains(n)) {
-        return cursor.fail(8, format!("{} x {} texels; 1 to {MOST_PIXELS} along an axis are possible", size[0], size[1]));
+    if size.iter().any(|n| !(1..=MOST_TEXELS as u32).contains(n)) {
+        return cursor.fail(8, format!("{} x {} texels; 1 to {MOST_TEXELS} along an axis are possible", size[0], size[1]));
     }
     head.size = size.map(|n| n as usize);
     Ok(())

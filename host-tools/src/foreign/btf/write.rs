@@ -82,12 +82,9 @@ pub fn export(dataset: &Dataset, path: &Path, components: usize) -> Result<f64> 
         number(&mut bytes, f64::from(*mean) / scale);
         row.iter().for_each(|n| bytes.extend(n.to_le_bytes()));
     }
-    // The lowest row of the picture comes first.
-    for line in of_texels.chunks(rank * width).rev() {
-        for row in line.chunks(rank) {
-            number(&mut bytes, scale);
-            row.iter().for_each(|n| bytes.extend(n.to_le_bytes()));
-        }
+    for row in of_texels.chunks(rank) {
+        number(&mut bytes, scale);
+        row.iter().for_each(|n| bytes.extend(n.to_le_bytes()));
     }
     files::write(path, &bytes)?;
     Ok(pca.predicted_rms(rank))
