@@ -345,3 +345,63 @@ fn check_cover(check: &mut Check<'_, '_>, set: &Set) -> bool {
     // Sides without a neighbour are the hull's; by Euler's formula the counts then use every direction.
     check.ensure(open_sides == set.hull_count, Rule::Cover, set.byte(set.hull), open_sides)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_cover_the_square_once() {
+        for size in 1..=64 {
+            let mut next = -16384;
+            for cell in 0..size {
+                let (first, last) = cell_range(cell, size);
+                assert_eq!(first, next, "cell {cell} of {size}");
+                assert!((first..=last).all(|q14| grid_cell(q14, size) == cell), "cell {cell} of {size}");
+                next = last + 1;
+            }
+            assert_eq!(next, 16385);
+        }
+    }
+
+    /// Whether a point is in a triangle that turns left, sides included.
+    fn holds([a, b, c]: [Point; 3], p: Point) -> bool {
+        [(a, b), (b, c), (c, a)].iter().all(|&(a, b)| cross(a.0, a.1, b.0, b.1, p.0, p.1) >= 0)
+    }
+
+    /// Whether two segments have a point in common.
+    fn meet((a, b): (Point, Point), (c, d): (Point, Point)) -> bool {
+        let side = |a: Point, b: Point, p: Point| cross(a.0, a.1, b.0, b.1, p.0, p.1).signum();
+        let between =
+            |a: Point, b: Point, p: Point| (a.0.min(b.0)..=a.0.max(b.0)).contains(&p.0) && (a.1.min(b.1)..=a.1.max(b.1)).contains(&p.1) && side(a, b, p) == 0;
+        (side(a, b, c) * side(a, b, d) < 0 && side(c, d, a) * side(c, d, b) < 0) || between(a, b, c) || between(a, b, d) || between(c, d, a) || between(c, d, b)
+    }
+
+    #[test]
+    fn triangles_meet_cells_as_their_points_do() {
+        let mut state = 7u32;
+        let mut next = |limit: u32| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            ((state >> 16) % limit) as i32
+        };
+        let mut met = [0u32; 2];
+        for _ in 0..40_000 {
+            let mut triangle = [(); 3].map(|()| (next(13), next(13)));
+            let [a, b, c] = triangle;
+            match cross(a.0, a.1, b.0, b.1, c.0, c.1) {
+                0 => continue,
+                1.. => {}
+                _ => triangle = [a, c, b],
+            }
+            let ((x, y), (width, height)) = ((next(13), next(13)), (next(6), next(6)));
+            let corners = [(x, y), (x + width, y), (x + width, y + height), (x, y + height)];
+            let sides = |points: &[Point]| -> [(Point, Point); 4] { core::array::from_fn(|i| (points[i % points.len()], points[(i + 1) % points.len()])) };
+            let expected = triangle.iter().any(|p| (x..=x + width).contains(&p.0) && (y..=y + height).contains(&p.1))
+                || corners.iter().any(|&p| holds(triangle, p))
+                || sides(&triangle)[..3].iter().any(|&side| sides(&corners).iter().any(|&other| meet(side, other)));
+            assert_eq!(meets_cell(triangle, (x, x + width), (y, y + height)), expected, "{triangle:?}, {corners:?}");
+            met[usize::from(expected)] += 1;
+        }
+        assert!(met.iter().all(|&count| count > 5_000), "{met:?}");
+    }
+}

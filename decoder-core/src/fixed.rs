@@ -138,6 +138,18 @@ mod tests {
     }
 
     #[test]
+    fn binary32_is_assembled_as_floats_are_rounded() {
+        for exponent in -140..=140 {
+            // None of them is halfway between two floats.
+            for mantissa in [1u32, 3, 0x7fff_ffff, 0x8000_0000, 0x8000_007f, 0x8000_0081, 0xffff_ff7f, 0xffff_ff81, u32::MAX] {
+                let exact = f64::from(mantissa) * 2f64.powi(exponent - 31);
+                let expected = if exact < f64::from(f32::MIN_POSITIVE) { 0.0 } else { (exact as f32).min(f32::MAX) };
+                assert_eq!(f32::from_bits(assemble_binary32(mantissa, exponent)), expected, "{mantissa} * 2^({exponent} - 31)");
+            }
+        }
+    }
+
+    #[test]
     fn products_equal_wide_arithmetic() {
         for (p, u) in draws() {
             assert_eq!(multiply_q15(p, u) as i64, (p as i64 * u as i64 + (1 << 14)) >> 15);

@@ -1,6 +1,6 @@
 //! The conformance suite, with nothing but the core: every vector is answered as its manifest states, on every path.
 
-use selvedge::{Direction, FilteredQuery, First, Limits, Part, Rgb, Selvedge, open_with, validate};
+use selvedge::{BufferTooSmall, Direction, FilteredQuery, First, Limits, Part, Rgb, Selvedge, open_with, validate};
 use std::path::{Path, PathBuf};
 
 fn folder() -> PathBuf {
@@ -30,12 +30,25 @@ fn fast_paths_agree(material: &Selvedge<'_>) {
             FilteredQuery { u_q32: next(), v_q32: next(), light, view }
         })
         .collect();
+    // On the horizon, and on every sample direction, where a weight is zero.
+    let mut queries = queries;
+    for i in 0..8 {
+        let (light, view) = (material.light_direction(i), material.view_direction(i));
+        queries.push(FilteredQuery { u_q32: next(), v_q32: next(), light, view });
+        queries.push(FilteredQuery { u_q32: next(), v_q32: next(), light: Direction { z_q15: 0, ..light }, view: Direction { z_q15: 0, ..view } });
+    }
     let mut scratch = vec![-1; material.batch_scratch_len(queries.len())];
     let mut out = vec![Rgb::default(); queries.len()];
     material.sample_batch(&queries, &mut scratch, &mut out).expect("buffers fit");
     for (query, rgb) in queries.iter().zip(&out) {
         assert_eq!(material.filtered(query.u_q32, query.v_q32, query.light, query.view), *rgb);
     }
+    // A result longer than the queries is left alone behind them; a shorter one is refused.
+    let mut longer = vec![Rgb { r: 7, g: 7, b: 7 }; queries.len() + 1];
+    material.sample_batch(&queries, &mut scratch, &mut longer).expect("buffers fit");
+    assert_eq!((&longer[..queries.len()], longer[queries.len()]), (&out[..], Rgb { r: 7, g: 7, b: 7 }));
+    let short = BufferTooSmall { needed: queries.len(), lent: queries.len() - 1 };
+    assert_eq!(material.sample_batch(&queries, &mut scratch, &mut longer[..queries.len() - 1]), Err(short));
     assert!(material.sample_batch(&queries, &mut scratch[1..], &mut out).is_err() || material.batch_scratch_len(queries.len()) == 0);
     for level in 0..material.header().level_count {
         let [width, height] = material.image_size(level);
@@ -114,4 +127,44 @@ fn the_suite_is_answered_as_stated() {
         count += 1;
     }
     assert!(count > 200, "{count}");
+}
+
+/// What makes queries and shows answers, beside the arithmetic.
+#[test]
+fn numbers_and_words_of_callers() {
+    use selvedge::{Finding, Rule, open, open_telling, position_from_f32};
+    assert_eq!(Rgb { r: 1f32.to_bits(), g: 0.5f32.to_bits(), b: 0 }.to_f32(), [1.0, 0.5, 0.0]);
+    assert_eq!([0.25, 1.25, -0.75, 3.0].map(position_from_f32), [1 << 30, 1 << 30, 1 << 30, 0]);
+    // x / (1 + z) of 0.6, 0, 0.8 is a third.
+    let direction = Direction { x_q18: 87_381, y_q18: 0, z_q15: 26_214 };
+    assert_eq!(Direction::from_unit_vector([0.6, 0.0, 0.8]), direction);
+    let up = Direction { x_q18: 0, y_q18: 0, z_q15: 32_768 };
+    let query = FilteredQuery { u_q32: 1 << 30, v_q32: 1 << 31, light: direction, view: up };
+    assert_eq!(FilteredQuery::from_f32([0.25, -0.5], [0.6, 0.0, 0.8], [0.0, 0.0, 1.0]), query);
+
+    let file = read("valid/minor-version.selv");
+    assert_eq!(open(&file, &Limits::NONE).expect("legal").header().minor_version, 7);
+    let finding = Finding { rule: Rule::SectionPadding, part: Part::Dictionary, offset: 40, found: 255 };
+    let words = finding.to_string();
+    assert!(words.starts_with("dictionary: 3.2-5 at byte 40: ") && words.ends_with("; found 255 (0xff)"), "{words}");
+    assert!(!Finding { part: Part::File, ..finding }.to_string().contains("dictionary"));
+    assert_eq!(BufferTooSmall { needed: 5, lent: 4 }.to_string(), "the buffer has 4 elements, 5 are needed");
+
+    // A sink that is a closure hears what there is, and ends it where it says so.
+    let mut broken = file.clone();
+    for entry in [128, 144] {
+        let section = u32::from_le_bytes(*file[entry + 4..].first_chunk().expect("a word")) as usize;
+        broken[section] ^= 1;
+    }
+    let heard = |more: bool| {
+        let mut heard = Vec::new();
+        let opened = open_telling(&broken, None, &Limits::NONE, &mut |finding: Finding| {
+            heard.push(finding.rule.id());
+            more
+        });
+        assert!(opened.is_none());
+        heard
+    };
+    let sum = Rule::SectionChecksum.id();
+    assert_eq!((heard(false), &heard(true)[..2]), (vec![sum], &[sum, sum][..]));
 }
