@@ -9,7 +9,7 @@ use super::decoder::{At, Blend, Decoder, EXPONENTIAL, Frame, Pairs, add_row, dot
 use super::{Row, Sums};
 use crate::dataset::Dataset;
 use crate::error::Result;
-use crate::linear::{clean_registers, eigenbasis, ordered, product, product_at, product_bt};
+use crate::linear::{WAVE, clean_registers, eigenbasis, ordered_in, product, product_at, product_bt};
 use crate::random::Random;
 use crate::transfer::log2;
 use std::cell::RefCell;
@@ -144,7 +144,12 @@ thread_local! {
 }
 
 /// Work on the linear values of batches of texels, results in the order of the texels.
-pub(super) fn pass<T: Send, A>(dataset: &Dataset, work: impl Fn(usize, &[f32]) -> T + Sync, total: A, mut fold: impl FnMut(&mut A, T)) -> Result<A> {
+pub(super) fn pass<T: Send, A>(dataset: &Dataset, work: impl Fn(usize, &[f32]) -> T + Sync, total: A, fold: impl FnMut(&mut A, T)) -> Result<A> {
+    pass_in(WAVE, dataset, work, total, fold)
+}
+
+/// As [`pass`], with so many batches at once.
+fn pass_in<T: Send, A>(wave: usize, dataset: &Dataset, work: impl Fn(usize, &[f32]) -> T + Sync, total: A, mut fold: impl FnMut(&mut A, T)) -> Result<A> {
     let (texels, columns) = (dataset.description().texels(), dataset.description().texel_len());
     let part = |i: usize| -> Result<T> {
         let count = BATCH.min(texels - i * BATCH);
@@ -154,7 +159,22 @@ pub(super) fn pass<T: Send, A>(dataset: &Dataset, work: impl Fn(usize, &[f32]) -
             Ok(work(i * BATCH, values))
         })
     };
-    ordered(texels.div_ceil(BATCH), part, total, |total, _, result| fold(total, result))
+    ordered_in(wave, texels.div_ceil(BATCH), part, total, |total, _, result| fold(total, result))
+}
+
+/// Memory of a decomposition, bytes, if nothing else is said.
+pub const MEMORY: usize = 4 << 30;
+
+/// What `memory` bytes allow: how many of `max_rank` components, and how many batches at once.
+fn fit_in(memory: usize, [texels, columns]: [usize; 2], max_rank: usize) -> (usize, usize) {
+    let wide = |rank: usize| rank + (rank / OVERSAMPLING.0).max(OVERSAMPLING.1);
+    // Of a direction of the iteration: its sums, two matrices of the decomposition and the result over the pairs; its part and two results over texels.
+    let held = |rank: usize| wide(rank).saturating_mul(columns * (8 + 8 + 8 + 4) + texels * 12);
+    // Of a batch: its values twice, and what it adds.
+    let batch = |rank: usize| columns * (2 * BATCH + wide(rank)) * 4;
+    let fits = |rank: usize| held(rank).saturating_add(batch(rank)) <= memory;
+    let rank = (1..=max_rank).rev().find(|&rank| fits(rank)).unwrap_or(1);
+    (rank, (memory.saturating_sub(held(rank)) / batch(rank)).clamp(1, WAVE))
 }
 
 /// Orthonormal columns with the span of a tall matrix, both row-major.
@@ -169,6 +189,15 @@ fn orthonormal(matrix: &[f64], columns: usize) -> Vec<f32> {
 /// # Errors
 /// If the data cannot be read.
 pub fn pca(dataset: &Dataset, domain: Domain, max_rank: usize) -> Result<Pca<'_>> {
+    pca_within(dataset, domain, max_rank, MEMORY)
+}
+
+/// The same within some bytes of memory, whatever the size of the data. First fewer batches are worked on at once, which changes no bit; where not
+/// even one fits, there are fewer components.
+///
+/// # Errors
+/// As [`pca`].
+pub fn pca_within(dataset: &Dataset, domain: Domain, max_rank: usize, memory: usize) -> Result<Pca<'_>> {
     let (texels, columns) = (dataset.description().texels(), dataset.description().texel_len());
     let offset = dataset.statistics().log_offset();
     let forward = |x: f32| domain.forward(x, offset);
@@ -178,11 +207,11 @@ pub fn pca(dataset: &Dataset, domain: Domain, max_rank: usize) -> Result<Pca<'_>
         sum
     };
     let add = |total: &mut Vec<f64>, sum: Vec<f64>| total.iter_mut().zip(sum).for_each(|(total, sum)| *total += sum);
-    let sum = pass(dataset, sums, vec![0.0; columns], add)?;
+    let sum = pass_in(WAVE, dataset, sums, vec![0.0; columns], add)?;
     let mean: Vec<f32> = sum.iter().map(|sum| (sum / texels as f64) as f32).collect();
 
     let most = texels.min(columns);
-    let rank = max_rank.clamp(1, most);
+    let (rank, wave) = fit_in(memory, [texels, columns], max_rank.clamp(1, most));
     let wide = (rank + (rank / OVERSAMPLING.0).max(OVERSAMPLING.1)).min(most);
     let mut random = Random::new(1);
     let start: Vec<f64> = (0..columns * wide).map(|_| random.range(-1_000_000, 1_000_000) as f64).collect();
@@ -200,7 +229,7 @@ pub fn pca(dataset: &Dataset, domain: Domain, max_rank: usize) -> Result<Pca<'_>
             back
         };
         let add = |total: &mut Vec<f64>, part: Vec<f32>| total.iter_mut().zip(part).for_each(|(total, part)| *total += part as f64);
-        q = orthonormal(&pass(dataset, work, vec![0.0; columns * wide], add)?, wide);
+        q = orthonormal(&pass_in(wave, dataset, work, vec![0.0; columns * wide], add)?, wide);
     }
     // In the subspace the singular vectors are those of a small matrix.
     let work = |_: usize, values: &[f32]| {
@@ -213,7 +242,7 @@ pub fn pca(dataset: &Dataset, domain: Domain, max_rank: usize) -> Result<Pca<'_>
         (projected, gram, matrix.iter().map(|&v| (v as f64).powi(2)).sum::<f64>())
     };
     let start = (Vec::new(), vec![0.0; wide * wide], 0.0);
-    let (projected, gram, energy) = pass(dataset, work, start, |(all, gram, energy), (projected, part, of_part): (Vec<f32>, Vec<f32>, f64)| {
+    let (projected, gram, energy) = pass_in(wave, dataset, work, start, |(all, gram, energy), (projected, part, of_part): (Vec<f32>, Vec<f32>, f64)| {
         all.extend(projected);
         gram.iter_mut().zip(part).for_each(|(total, part): (&mut f64, f32)| *total += part as f64);
         *energy += of_part;
@@ -399,6 +428,18 @@ impl Pca<'_> {
 mod tests {
     use super::*;
     use crate::baseline::tests::small;
+
+    #[test]
+    fn memory_limits_batches_and_then_components() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let dataset = small(folder.path(), [21, 12]);
+        let within = |memory| pca_within(&dataset, Domain::Log, 12, memory).expect("made");
+        let (all, tight, few) = (within(MEMORY), within(260_000), within(150_000));
+        assert_eq!([fit_in(MEMORY, [252, 162], 12), fit_in(260_000, [252, 162], 12)], [(12, WAVE), (12, 1)]);
+        let bits = |pca: &Pca<'_>| -> Vec<u32> { pca.of_texels.iter().chain(&pca.of_pairs).map(|v| v.to_bits()).collect() };
+        assert!(bits(&all) == bits(&tight));
+        assert!((1..12).contains(&few.rank()), "{}", few.rank());
+    }
 
     #[test]
     fn components_explain_what_they_should_at_the_stated_bytes() {

@@ -117,6 +117,9 @@ pub struct EncodeArgs {
     /// Sparse tensor: components that training works in; memory grows with them, not with the data
     #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u16).range(1..=2048))]
     rank: u16,
+    /// Sparse tensor: memory of its decomposition, in MB; the less, the fewer parts at once, and then the fewer components
+    #[arg(long, default_value_t = 4000, value_parser = clap::value_parser!(u32).range(16..=1_000_000))]
+    memory: u32,
     /// Tell what was reached, as JSON, to stdout
     #[arg(long)]
     json: bool,
@@ -171,6 +174,8 @@ struct OfEnsemble {
 #[derive(Clone, Debug, serde::Serialize)]
 struct OfTensor {
     shape: [usize; 4],
+    /// Components that training worked in.
+    components: usize,
     list_coefficients: usize,
     /// Coefficients that were limited to the range of their atom.
     limited: usize,
@@ -329,7 +334,7 @@ fn by_tensor(args: &EncodeArgs, data: &Dataset, coarser: &[Dataset], transfer: D
     let goal = args.goal(transfer, data)?;
     let tell = |what: &str, done, all| progress.tell(what, done, all);
     tell("components", 0, 1);
-    let components = pca::pca(data, transfer.of_components(), args.rank as usize)?;
+    let components = pca::pca_within(data, transfer.of_components(), args.rank as usize, args.memory as usize * 1_000_000)?;
     let training = tensor::fit::Training::default();
     let shape = match args.shape {
         Some([light_atoms, abrdf_atoms, entries, coefficients]) => tensor::fit::Shape { light_atoms, abrdf_atoms, entries, coefficients },
@@ -367,6 +372,7 @@ fn by_tensor(args: &EncodeArgs, data: &Dataset, coarser: &[Dataset], transfer: D
         metrics,
         ensemble: None,
         tensor: Some(OfTensor {
+            components: components.rank(),
             shape: [shape.light_atoms, shape.abrdf_atoms, shape.entries, shape.coefficients],
             list_coefficients: encoded.coefficients,
             limited: encoded.limited,
