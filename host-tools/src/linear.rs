@@ -142,12 +142,7 @@ pub fn nearest_orthogonal(matrix: &[f64], n: usize) -> Option<Basis> {
 pub const WAVE: usize = 16;
 
 /// `fold(total, work(i))` for `i` ascending, the work in parallel: the same bits for any number of threads.
-pub fn ordered<T: Send, E: Send, A>(
-    count: usize,
-    work: impl Fn(usize) -> Result<T, E> + Sync,
-    total: A,
-    fold: impl FnMut(&mut A, usize, T),
-) -> Result<A, E> {
+pub fn ordered<T: Send, E: Send, A>(count: usize, work: impl Fn(usize) -> Result<T, E> + Sync, total: A, fold: impl FnMut(&mut A, usize, T)) -> Result<A, E> {
     ordered_in(WAVE, count, work, total, fold)
 }
 

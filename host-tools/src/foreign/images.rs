@@ -632,7 +632,7 @@ mod tests {
     #[test]
     fn bad_folders_are_refused_with_the_file_and_the_place() {
         const BAD: &str = "tl030_pl000_tv000_pv000.exr";
-        for (value, text) in [(f32::NAN, "NaN"), (f32::INFINITY, "inf"), (f32::NEG_INFINITY, "-inf"), (70_000.0, "70000; --float holds it")] {
+        for (value, text) in [(f32::NAN, "NaN"), (f32::INFINITY, "inf"), (f32::NEG_INFINITY, "-inf"), (70_000.0, "--float holds it")] {
             let spoil = |texel, c| if (texel, c) == (4, 2) { value } else { 0.5 };
             refused(&[BAD, "pixel (1, 1), blue", text], |folder| exr(&folder.join(BAD), [3, 2], spoil));
         }
