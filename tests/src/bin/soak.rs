@@ -3,7 +3,7 @@
 //! `soak EXECUTIONS [TARGET...]`; what fails is written beside as `soak-TARGET.bytes` before the panic is told. It has no feedback
 //! from coverage, so it finds less than libFuzzer in the same number of executions; it needs nothing but a stable compiler.
 //!
-//! The heap is watched: reading the files of others may take twice what is given and a constant ([`Target::memory`]).
+//! The heap is watched: reading the files of others may take twice what is given and a constant (`Target::memory` of the targets).
 
 use peak_alloc::PeakAlloc;
 use selvedge_tests::targets::{TARGETS, suite};
