@@ -50,6 +50,7 @@ fn fast_paths_agree(material: &Selvedge<'_>) {
     let short = BufferTooSmall { needed: queries.len(), lent: queries.len() - 1 };
     assert_eq!(material.sample_batch(&queries, &mut scratch, &mut longer[..queries.len() - 1]), Err(short));
     assert!(material.sample_batch(&queries, &mut scratch[1..], &mut out).is_err() || material.batch_scratch_len(queries.len()) == 0);
+    assert_eq!(material.image_size(0), [material.header().width, material.header().height]);
     for level in 0..material.header().level_count {
         let [width, height] = material.image_size(level);
         let texels = (width * height) as usize;
@@ -167,4 +168,17 @@ fn numbers_and_words_of_callers() {
     };
     let sum = Rule::SectionChecksum.id();
     assert_eq!((heard(false), &heard(true)[..2]), (vec![sum], &[sum, sum][..]));
+
+    // What is beyond the caller's limits is not looked into, whatever else is wrong with it (4.1).
+    let limited = |limits: Limits| {
+        let mut heard = Vec::new();
+        validate(&broken, None, &limits, &mut |finding: Finding| {
+            heard.push(finding.rule);
+            true
+        });
+        heard
+    };
+    assert_eq!(limited(Limits { bytes: 10, ..Limits::NONE }), [Rule::LimitBytes]);
+    assert_eq!(limited(Limits { operations: 1, ..Limits::NONE }), [Rule::LimitOperations]);
+    assert_eq!(limited(Limits { texels: 1, ..Limits::NONE }), [Rule::LimitTexels]);
 }

@@ -432,7 +432,12 @@ fn make_one(kind: &str, recipe: &Recipe, model: &MaterialModel, made: &BTreeMap<
             let part = if of_dictionary { "dictionary" } else { "file" };
             Answer::Broken(expect.rule.clone(), part.into(), place(looked_at, &expect.at)? as u32, expect.found.get()?)
         }
-        (None, "valid") => answer(&vector.bytes, dictionary.map(|d| &d.bytes[..]), &vector.limits()),
+        (None, "valid") => match answer(&vector.bytes, dictionary.map(|d| &d.bytes[..]), &vector.limits()) {
+            Answer::Broken(rule, part, at, found) => {
+                return Err(ToolError::Mismatch(format!("{}: a valid file, which breaks {rule} at byte {at} of the {part} (found {found})", vector.path)));
+            }
+            answer => answer,
+        },
         _ => return Err(ToolError::Usage("invalid files state what they break, valid ones do not".into())),
     };
     Ok(vector)
