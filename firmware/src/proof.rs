@@ -173,6 +173,8 @@ fn kernel(files: words::Words<'_>) {
     let channel = any(material::Channel::default());
     black_box((position::block_count(&one, n()), material::level_size(n(), n()), selvedge::position_from_f32(any(0.0))));
 
+    black_box(selvedge::metadata::is_invisible(any('a')));
+
     let (values, taps) = (any(Values::default()), any(Taps::default()));
     black_box((colour::matrix_row(i(), i(), i(), values), colour::present(n(), i(), i()), colour::transfer_log2(i(), n(), i(), i())));
     black_box((colour::transfer_linear(i(), i(), i()), colour::transfer(&one, i(), i()), colour::colour(&one, values, i())));
