@@ -223,6 +223,18 @@ impl Writer {
         [texel % self.description.size[0], texel / self.description.size[0]]
     }
 
+    /// Puts images, `[y][x]`, of successive pairs from `first_pair` on.
+    ///
+    /// # Errors
+    /// As [`Writer::put`].
+    pub fn put_images(&self, first_pair: usize, images: &[Vec<[f32; 3]>]) -> Result<()> {
+        (0..self.description.texels()).into_par_iter().try_for_each_init(Vec::new, |run, texel| {
+            run.clear();
+            run.extend(images.iter().flat_map(|image| image[texel]));
+            self.put(texel, first_pair, run)
+        })
+    }
+
     fn pair_place(&self, pair: usize) -> [usize; 2] {
         [pair % self.description.lights.len(), pair / self.description.lights.len()]
     }
@@ -285,6 +297,20 @@ impl Dataset {
         Ok(Dataset { file, path: path.to_owned(), description, statistics })
     }
 
+    /// Makes a dataset of a function of the texel and of the number in it, `[view][light][colour]`, called in that order.
+    ///
+    /// # Errors
+    /// As those of [`Writer`].
+    pub fn from_fn(path: &Path, description: Description, mut value: impl FnMut(usize, usize) -> f32) -> Result<Dataset> {
+        let (texels, length) = (description.texels(), description.texel_len());
+        let writer = Writer::create(path, description)?;
+        for texel in 0..texels {
+            writer.put(texel, 0, &(0..length).map(|i| value(texel, i)).collect::<Vec<f32>>())?;
+        }
+        writer.finish()?;
+        Dataset::open(path)
+    }
+
     /// Whether a file begins as a dataset does.
     pub fn is_one(path: &Path) -> bool {
         let mut magic = [0; 8];
@@ -320,6 +346,17 @@ impl Dataset {
     /// As [`Dataset::read`].
     pub fn read_pairs(&self, texel: usize, first_pair: usize, bytes: &mut Vec<u8>, values: &mut [f32]) -> Result<()> {
         self.read_numbers(texel * self.description.texel_len() + first_pair * 3, bytes, values)
+    }
+
+    /// Reads successive pairs of all texels: `[texel][pair][colour]`.
+    ///
+    /// # Errors
+    /// As [`Dataset::read`].
+    pub fn read_images(&self, first_pair: usize, pairs: usize) -> Result<Vec<f32>> {
+        let mut values = vec![0.0; self.description.texels() * pairs * 3];
+        let runs = values.par_chunks_mut(pairs * 3).enumerate();
+        runs.try_for_each_init(Vec::new, |bytes, (texel, run)| self.read_pairs(texel, first_pair, bytes, run))?;
+        Ok(values)
     }
 
     fn read_numbers(&self, first: usize, bytes: &mut Vec<u8>, values: &mut [f32]) -> Result<()> {

@@ -32,11 +32,7 @@ pub fn expand(file: &Selvedge<'_>, output: &Path, memory: usize, progress: &dyn 
         let count = batch.min(pairs - first);
         let image = |i: usize| measure::image(Source::File(file, 0), &description, (first + i) % lights, (first + i) / lights);
         let images = (0..count).into_par_iter().map(image).collect::<Result<Vec<_>>>()?;
-        (0..texels).into_par_iter().try_for_each_init(Vec::new, |run, texel| {
-            run.clear();
-            run.extend(images.iter().flat_map(|image| image[texel]));
-            writer.put(texel, first, run)
-        })?;
+        writer.put_images(first, &images)?;
         progress(first + count, pairs);
     }
     writer.finish()?;

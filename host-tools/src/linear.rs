@@ -4,7 +4,8 @@
 //! order, so that no number depends on how many threads there are.
 
 use faer::linalg::matmul::matmul;
-use faer::{Accum, MatMut, MatRef, Par, Side};
+use faer::linalg::solvers::Solve as _;
+use faer::{Accum, Mat, MatMut, MatRef, Par, Side};
 use half::slice::HalfFloatSliceExt as _;
 use rayon::prelude::*;
 
@@ -14,12 +15,12 @@ pub fn multiply(out: MatMut<'_, f32>, a: MatRef<'_, f32>, b: MatRef<'_, f32>, ad
     clean_registers();
 }
 
-/// Clears the upper halves of the vector registers, to be called after `faer` has worked.
+/// Clears the upper halves of the vector registers, to be called after `faer` has worked, which is why nothing but this module lets it work.
 ///
 /// Its microkernels for x86 return without `vzeroupper` (seen with faer 0.24), and from then on every scalar instruction of the thread waits for
 /// registers that it does not read: the import of a `.btf` took four times as long. A conversion from binary16 is compiled to leave them clean, and is
 /// the only instruction sequence of that kind that can be had here without `unsafe`. It costs eight conversions.
-pub fn clean_registers() {
+fn clean_registers() {
     let mut numbers = [0.0; 8];
     [half::f16::ONE; 8].convert_to_f32_slice(&mut numbers);
     std::hint::black_box(numbers);
@@ -136,6 +137,23 @@ pub fn nearest_orthogonal(matrix: &[f64], n: usize) -> Option<Basis> {
     let u = svd.U() * svd.V().transpose();
     clean_registers();
     u.as_ref().col_iter().all(|c| c.iter().all(|x| x.is_finite())).then(|| Basis::from_fn(n, n, |r, c| u[(r, c)] as f32))
+}
+
+/// Orthonormal columns with the span of a tall matrix of so many columns, row-major.
+pub fn orthonormal(matrix: &[f64], columns: usize) -> Mat<f64> {
+    let q = Mat::from_fn(matrix.len() / columns, columns, |r, c| matrix[r * columns + c]).qr().compute_thin_Q();
+    clean_registers();
+    q
+}
+
+/// The solution of an `n x n` symmetric system for right sides of `n` rows, row-major; nothing if the matrix is not positive definite.
+pub fn solve_symmetric(matrix: impl Fn(usize, usize) -> f64, right: &[f64], n: usize) -> Option<Mat<f64>> {
+    let columns = right.len() / n;
+    let right = Mat::from_fn(n, columns, |r, c| right[r * columns + c]);
+    let factor = Mat::from_fn(n, n, matrix).llt(Side::Lower).ok();
+    let solution = factor.map(|factor| factor.solve(&right));
+    clean_registers();
+    solution
 }
 
 /// Items worked on at once between two ordered additions.

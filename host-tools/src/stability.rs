@@ -4,12 +4,12 @@
 //! and measures. Nothing is left out silently: a case that cannot be made is a failure. `selvedge report --stability` puts the table on a page.
 
 use crate::baseline::pca::{Domain, pca};
-use crate::dataset::{Dataset, Description, Sample, Writer};
+use crate::dataset::{Dataset, Description, Sample};
 use crate::directions;
 use crate::encode::{self, prepare};
 use crate::error::{Result, ToolError};
 use crate::extreme::{extreme_model, extreme_tensor};
-use crate::linear::{eigenbasis, nearest_orthogonal, product_at};
+use crate::linear::{eigenbasis, nearest_orthogonal, orthonormal, product_at};
 use crate::measure::{Source, compare, query};
 use crate::random::Random;
 use crate::tensor::ksvd::{Pursuit, Rows, code_all, dot, gram, iterate, normalise, pursue};
@@ -569,8 +569,7 @@ fn largest_fibre_sum(file: &Selvedge<'_>) -> f64 {
 fn conditioned(rows: usize, columns: usize, condition: f64, seed: u64) -> Vec<f32> {
     let mut random = Random::new(seed);
     let mut draw = |n: usize| -> Vec<f64> { (0..n).map(|_| random.range(-1_000_000, 1_000_000) as f64 / 1e6).collect() };
-    let q = |values: Vec<f64>, n: usize| faer::Mat::from_fn(values.len() / n, n, |r, c| values[r * n + c]).qr().compute_thin_Q();
-    let (u, v) = (q(draw(rows * columns), columns), q(draw(columns * columns), columns));
+    let (u, v) = (orthonormal(&draw(rows * columns), columns), orthonormal(&draw(columns * columns), columns));
     let s = |k: usize| condition.powf(-(k as f64) / (columns as f64 - 1.0));
     (0..rows * columns).map(|i| (0..columns).map(|k| u[(i / columns, k)] * s(k) * v[(i % columns, k)]).sum::<f64>() as f32).collect()
 }
@@ -728,13 +727,7 @@ enum Method {
 fn dataset(folder: &Path, size: [usize; 2], lights: &[DVec3], views: &[DVec3], value: impl Fn(usize, usize, usize, usize) -> f32) -> Result<Dataset> {
     let path = folder.join("case.selvset");
     let description = Description { size, lights: lights.to_vec(), views: views.to_vec(), sample: Sample::Float, ..Description::default() };
-    let writer = Writer::create(&path, description)?;
-    for texel in 0..size[0] * size[1] {
-        let at = |i: usize| value(texel, i / 3 % lights.len(), i / 3 / lights.len(), i % 3);
-        writer.put(texel, 0, &(0..lights.len() * views.len() * 3).map(at).collect::<Vec<f32>>())?;
-    }
-    writer.finish()?;
-    Dataset::open(&path)
+    Dataset::from_fn(&path, description, |texel, i| value(texel, i / 3 % lights.len(), i / 3 / lights.len(), i % 3))
 }
 
 /// A file of a dataset, as exact as its encoder makes it, and the error that the encoder states.

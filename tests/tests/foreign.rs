@@ -130,14 +130,8 @@ fn small(path: &Path, sample: Sample, size: [usize; 2], value: impl Fn(usize) ->
     let views = vec![from_degrees(15.0, 120.0), from_degrees(75.0, 0.0)];
     let texts = ["Linen".into(), "measured".into(), "CC0".into()];
     let description = Description { size, lights, views, sample, cosine_included: true, texel_nm: [70_000; 2], texts };
-    let (texels, length) = (description.texels(), description.texel_len());
-    let writer = Writer::create(path, description).expect("created");
-    for texel in 0..texels {
-        let run: Vec<f32> = (0..length).map(|i| value(texel * length + i)).collect();
-        writer.put(texel, 0, &run).expect("put");
-    }
-    writer.finish().expect("finished");
-    Dataset::open(path).expect("opened")
+    let length = description.texel_len();
+    Dataset::from_fn(path, description, |texel, i| value(texel * length + i)).expect("written")
 }
 
 fn values(dataset: &Dataset) -> Vec<f32> {

@@ -59,7 +59,7 @@ impl Sums {
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use crate::dataset::{Dataset, Description, Sample, Writer};
+    use crate::dataset::{Dataset, Description, Sample};
     use crate::directions;
     use crate::random::Random;
     use std::path::Path;
@@ -69,19 +69,12 @@ pub(crate) mod tests {
         let lights = directions::grid(81).expect("known")[..9].to_vec();
         let path = folder.join("a.selvset");
         let description = Description { size, views: lights[..6].to_vec(), lights, sample: Sample::Float, ..Description::default() };
-        let writer = Writer::create(&path, description).expect("created");
         let mut random = Random::new(7);
-        let pairs = writer.description().pairs();
-        for texel in 0..size[0] * size[1] {
-            let wave = |i: usize, k: usize| ((i * (k + 2)) as f32 * 0.37).sin();
-            let value = |i: usize| {
-                let log = (0..3).map(|k| wave(texel, k) * wave(i / 3, k + 3)).sum::<f32>() + wave(i, 1) * 0.2;
-                log.exp() + random.range(0, 1000) as f32 / 1e5
-            };
-            let values: Vec<f32> = (0..pairs * 3).map(value).collect();
-            writer.put(texel, 0, &values).expect("put");
-        }
-        writer.finish().expect("finished");
-        Dataset::open(&path).expect("opened")
+        let wave = |i: usize, k: usize| ((i * (k + 2)) as f32 * 0.37).sin();
+        let value = |texel: usize, i: usize| {
+            let log = (0..3).map(|k| wave(texel, k) * wave(i / 3, k + 3)).sum::<f32>() + wave(i, 1) * 0.2;
+            log.exp() + random.range(0, 1000) as f32 / 1e5
+        };
+        Dataset::from_fn(&path, description, value).expect("written")
     }
 }

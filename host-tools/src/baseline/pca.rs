@@ -9,7 +9,7 @@ use super::decoder::{At, Blend, Decoder, EXPONENTIAL, Frame, Pairs, add_row, dot
 use super::{Row, Sums};
 use crate::dataset::Dataset;
 use crate::error::Result;
-use crate::linear::{WAVE, clean_registers, eigenbasis, ordered_in, product, product_at, product_bt};
+use crate::linear::{self, WAVE, eigenbasis, ordered_in, product, product_at, product_bt};
 use crate::random::Random;
 use crate::transfer::log2;
 use std::cell::RefCell;
@@ -179,8 +179,7 @@ fn fit_in(memory: usize, [texels, columns]: [usize; 2], max_rank: usize) -> (usi
 
 /// Orthonormal columns with the span of a tall matrix, both row-major.
 fn orthonormal(matrix: &[f64], columns: usize) -> Vec<f32> {
-    let q = faer::Mat::from_fn(matrix.len() / columns, columns, |r, c| matrix[r * columns + c]).qr().compute_thin_Q();
-    clean_registers();
+    let q = linear::orthonormal(matrix, columns);
     (0..matrix.len()).map(|i| q[(i / columns, i % columns)] as f32).collect()
 }
 
@@ -207,7 +206,7 @@ pub fn pca_within(dataset: &Dataset, domain: Domain, max_rank: usize, memory: us
         sum
     };
     let add = |total: &mut Vec<f64>, sum: Vec<f64>| total.iter_mut().zip(sum).for_each(|(total, sum)| *total += sum);
-    let sum = pass_in(WAVE, dataset, sums, vec![0.0; columns], add)?;
+    let sum = pass(dataset, sums, vec![0.0; columns], add)?;
     let mean: Vec<f32> = sum.iter().map(|sum| (sum / texels as f64) as f32).collect();
 
     let most = texels.min(columns);

@@ -239,7 +239,7 @@ fn export(args: ExportArgs) -> Result<u8> {
 const MEMORY: usize = 256 << 20;
 
 /// Refuses an option that would do nothing.
-fn check_applies(option: &str, is_given: bool, applies: bool, to: &str) -> Result<()> {
+pub fn check_applies(option: &str, is_given: bool, applies: bool, to: &str) -> Result<()> {
     if is_given && !applies { Err(ToolError::Usage(format!("{option} is for {to} alone"))) } else { Ok(()) }
 }
 
@@ -249,8 +249,8 @@ fn check_output(source: &Path, output: &Path, is_folder: bool) -> Result<()> {
     if !is_folder && output.is_dir() {
         return refuse("this is a folder; a file is written");
     }
-    let same = |a: &Path, b: &Path| a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
-    if same(source, output) {
+    let is_same = source == output || source.canonicalize().is_ok_and(|a| output.canonicalize().is_ok_and(|b| a == b));
+    if is_same {
         return refuse("this is the source");
     }
     Ok(())
@@ -347,13 +347,13 @@ pub fn import_data(from: &Path, kind: Kind, output: &Path, args: DataArgs) -> Re
         Kind::Btf => {
             let btf = btf::Btf::open(from)?;
             // Before the long work, as far as it can fail.
-            let heights = args.height_map.as_ref().map(|path| Ok((path, btf.height_map()?))).transpose()?;
+            let read_heights = |path| check_output(output, path, false).and_then(|()| Ok((path, btf.height_map()?)));
+            let heights = args.height_map.as_deref().map(read_heights).transpose()?;
             if options.name.is_empty() {
                 options.name = of_path();
             }
             let imported = foreign::import_btf(&btf, output, &options, &tell)?;
             if let Some((path, heights)) = heights {
-                check_output(output, path, false)?;
                 let [width, height] = btf.head().height_map.unwrap_or_default().map(|n| n as usize);
                 picture::Picture::from_fn(width, height, |x, y| [heights[y * width + x]; 3]).save(path)?;
             }

@@ -366,10 +366,8 @@ fn run(cli: Cli) -> Result<u8> {
                     ("--value-bits", value_bits.is_some()),
                     ("--dictionary", dictionary.is_some()),
                 ];
-                match of_sparse.iter().find(|(_, is_given)| *is_given) {
-                    Some((option, _)) => Err(ToolError::Usage(format!("{option} is for folders of SparseBTF alone"))),
-                    None => commands::import_data(&source, kind, &output, data).map(|()| 0),
-                }
+                of_sparse.into_iter().try_for_each(|(option, is_given)| commands::check_applies(option, is_given, false, "folders of SparseBTF"))?;
+                commands::import_data(&source, kind, &output, data).map(|()| 0)
             }
             kind => Err(ToolError::Usage(format!("{}: this is a {kind} already", source.display()))),
         },

@@ -117,7 +117,7 @@ impl Archive {
             }
             Archive::Zip { numbers, .. } => numbers.keys().cloned().collect(),
         };
-        names.retain(|name| !name.components().any(|part| part.as_os_str().as_encoded_bytes().starts_with(b".")));
+        names.retain(|name| !is_hidden(name));
         names.sort();
         Ok(names)
     }
@@ -130,11 +130,11 @@ impl Archive {
         }
     }
 
-    /// How deep a file that lists the others may be: in the folder itself, or in the folder that a zip archive was made of.
-    pub fn depth_of_listing(&self) -> usize {
+    /// A file of this name in the folder itself, or in a zip archive also in the folder that it was made of.
+    pub fn find_shallow(&self, name: &str) -> Option<PathBuf> {
         match self {
-            Archive::Folder(_) => 1,
-            Archive::Zip { .. } => 2,
+            Archive::Folder(_) => Some(PathBuf::from(name)).filter(|path| self.has(path)),
+            Archive::Zip { numbers, .. } => numbers.keys().find(|path| path.ends_with(name) && path.components().count() <= 2 && !is_hidden(path)).cloned(),
         }
     }
 
@@ -169,6 +169,11 @@ impl Archive {
             }
         }
     }
+}
+
+/// Whether a file or a folder that it is in begins with a point.
+fn is_hidden(name: &Path) -> bool {
+    name.components().any(|part| part.as_os_str().as_encoded_bytes().starts_with(b"."))
 }
 
 fn walk(folder: &Path, below: &Path, depth: usize, names: &mut Vec<PathBuf>) -> Result<()> {

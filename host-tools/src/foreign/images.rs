@@ -22,7 +22,7 @@
 
 use super::archive::Archive;
 use super::pixels::{self, to_srgb};
-use super::{ImportOptions, Imported};
+use super::{Clipped, ImportOptions, Imported};
 use crate::dataset::{Dataset, Description, MOST_DIRECTIONS, Sample, Writer, first_beyond};
 use crate::directions::{from_degrees, grid, to_degrees};
 use crate::error::{Result, ToolError};
@@ -107,8 +107,7 @@ impl ImageSet {
         let path = &archive.path().to_owned();
         let memory = memory.max(SINGLE);
         let mut listing = Listing::default();
-        // Of a folder that was packed whole, the archive has the folder.
-        let place = archive.names()?.into_iter().find(|name| name.ends_with(LISTING) && name.components().count() <= archive.depth_of_listing());
+        let place = archive.find_shallow(LISTING);
         if let Some(name) = &place {
             let mut bytes = Vec::new();
             let file = archive.describe(name);
@@ -162,11 +161,7 @@ impl ImageSet {
                     images.push(image);
                 }
             }
-            (0..texels).into_par_iter().try_for_each_init(Vec::new, |run, texel| {
-                run.clear();
-                run.extend(images.iter().flat_map(|image| image[texel]));
-                writer.put(texel, first, run)
-            })?;
+            writer.put_images(first, &images)?;
             first += count;
             progress(first, pairs);
         }
@@ -191,19 +186,13 @@ impl ImageSet {
             return Err(bad(&path(), what));
         }
         let mut pixels = opened.pixels(options.colours).map_err(|what| bad(&path(), what))?;
-        let mut negative = 0;
-        // Colours that sRGB does not have, and noise about black. Infinities and NaN are left to be refused.
-        pixels.as_flattened_mut().iter_mut().filter(|v| **v < 0.0 && v.is_finite()).for_each(|v| {
-            *v = 0.0;
-            negative += 1;
-        });
-        let largest = options.sample.largest();
-        match first_beyond(pixels.as_flattened(), largest) {
+        // Colours that sRGB does not have, and noise about black.
+        let negative = Clipped::of(pixels.as_flattened_mut()).count;
+        match first_beyond(pixels.as_flattened(), options.sample.largest()) {
             Some(i) => {
-                let value = pixels[i / 3][i % 3];
-                let hint = if value.is_finite() && options.sample == Sample::Half { "; --float holds it" } else { "" };
+                let refused = options.refusal(pixels[i / 3][i % 3]);
                 let (x, y, channel) = (i / 3 % size[0], i / 3 / size[0], ["red", "green", "blue"][i % 3]);
-                Err(bad(&path(), format!("pixel ({x}, {y}), {channel}: {value} is not a radiance from 0 to {largest:e}{hint}")))
+                Err(bad(&path(), format!("pixel ({x}, {y}), {channel}: {refused}")))
             }
             None => Ok((pixels, negative)),
         }
@@ -248,9 +237,7 @@ pub fn export(dataset: &Dataset, folder: &Path, format: Format, memory: usize, p
     let mut clamped = 0;
     for first in (0..pairs).step_by(batch) {
         let count = batch.min(pairs - first);
-        let mut values = vec![0.0; texels * count * 3];
-        let runs = values.par_chunks_mut(count * 3).enumerate();
-        runs.try_for_each_init(Vec::new, |bytes, (texel, run)| dataset.read_pairs(texel, first, bytes, run))?;
+        let values = dataset.read_images(first, count)?;
         let written: Vec<Result<u64>> = (0..count)
             .into_par_iter()
             .map(|i| {
@@ -364,7 +351,7 @@ fn in_name(angle: f64) -> String {
 }
 
 /// The angle between two directions; NaN if one has no length.
-fn degrees_between(a: DVec3, b: DVec3) -> f64 {
+pub(super) fn degrees_between(a: DVec3, b: DVec3) -> f64 {
     // The chord, which is precise where the arc's cosine is not, and the arc wherever it matters here.
     (a.normalize() - b.normalize()).length().to_degrees()
 }
@@ -487,14 +474,8 @@ mod tests {
     }
 
     fn write_dataset(path: &Path, description: Description, value: impl Fn(usize) -> f32) -> Dataset {
-        let (texels, length) = (description.texels(), description.texel_len());
-        let writer = Writer::create(path, description).expect("created");
-        for texel in 0..texels {
-            let run: Vec<f32> = (0..length).map(|i| value(texel * length + i)).collect();
-            writer.put(texel, 0, &run).expect("put");
-        }
-        writer.finish().expect("finished");
-        Dataset::open(path).expect("opened")
+        let length = description.texel_len();
+        Dataset::from_fn(path, description, |texel, i| value(texel * length + i)).expect("written")
     }
 
     /// Lights and views that differ, of no grid, out of order, with angles that no decimals write.

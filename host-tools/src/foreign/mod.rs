@@ -57,6 +57,12 @@ impl Default for ImportOptions {
 }
 
 impl ImportOptions {
+    /// Why a value cannot be stored.
+    fn refusal(&self, value: f32) -> String {
+        let hint = if value.is_finite() && self.sample == Sample::Half { "; --float holds it" } else { "" };
+        format!("{value} is not a radiance from 0 to {:e}{hint}", self.sample.largest())
+    }
+
     /// A description of data, completed by what the user says.
     fn describe(&self, found: &Description) -> Description {
         let asked = [&self.name, &self.origin, &self.licence];
@@ -145,7 +151,6 @@ pub fn detect(path: &Path) -> Result<Kind> {
 pub fn import_btf(btf: &Btf, output: &Path, options: &ImportOptions, progress: &(dyn Fn(usize, usize) + Sync)) -> Result<Imported> {
     let head = btf.head();
     let writer = Writer::create(output, options.describe(&btf.description()))?;
-    let largest = options.sample.largest();
     let (texels, length, batch) = (head.size[0] * head.size[1], btf.texel_len(), btf.batch());
     let done = AtomicUsize::new(0);
     let work = |i: usize| -> Result<Clipped> {
@@ -153,24 +158,14 @@ pub fn import_btf(btf: &Btf, output: &Path, options: &ImportOptions, progress: &
         let count = batch.min(texels - first);
         let mut values = vec![0.0; count * length];
         btf.texels(first, count, &mut values)?;
-        let mut clipped = Clipped::default();
-        // Infinities and NaN are left to be refused.
-        values.iter_mut().filter(|v| **v < 0.0 && v.is_finite()).for_each(|v| {
-            clipped.count += 1;
-            clipped.least = clipped.least.min(*v);
-            *v = 0.0;
-        });
+        let clipped = Clipped::of(&mut values);
         for (i, texel) in values.chunks(length).enumerate() {
-            if let Some(n) = first_beyond(texel, largest) {
-                let (texel_number, [x, y]) = (first + i, [(first + i) % head.size[0], (first + i) / head.size[0]]);
-                let hint = if texel[n].is_finite() && options.sample == Sample::Half { "; --float holds it" } else { "" };
-                let what = format!(
-                    "texel ({x}, {y}), light {}, view {}: {} is not a radiance from 0 to {largest:e}{hint}",
-                    n / 3 % head.lights.len(),
-                    n / 3 / head.lights.len(),
-                    texel[n]
-                );
-                return Err(ToolError::Foreign { path: btf.path().to_owned(), offset: btf.offset(texel_number), what });
+            if let Some(n) = first_beyond(texel, options.sample.largest()) {
+                let (number, pair) = (first + i, n / 3);
+                let [x, y] = [number % head.size[0], number / head.size[0]];
+                let [light, view] = [pair % head.lights.len(), pair / head.lights.len()];
+                let what = format!("texel ({x}, {y}), light {light}, view {view}: {}", options.refusal(texel[n]));
+                return Err(ToolError::Foreign { path: btf.path().to_owned(), offset: btf.offset(number), what });
             }
             writer.put(first + i, 0, texel)?;
         }
@@ -200,10 +195,24 @@ pub fn import_btf(btf: &Btf, output: &Path, options: &ImportOptions, progress: &
     Ok(Imported { statistics: writer.finish()?, notes })
 }
 
+/// Negative values that became 0.
 #[derive(Clone, Copy, Default)]
 struct Clipped {
     count: u64,
     least: f32,
+}
+
+impl Clipped {
+    /// Makes them 0. Infinities and NaN are left to be refused.
+    fn of(values: &mut [f32]) -> Clipped {
+        let mut clipped = Clipped::default();
+        values.iter_mut().filter(|v| **v < 0.0 && v.is_finite()).for_each(|v| {
+            clipped.count += 1;
+            clipped.least = clipped.least.min(*v);
+            *v = 0.0;
+        });
+        clipped
+    }
 }
 
 impl Btf {
@@ -228,7 +237,7 @@ impl Btf {
 
 /// The directions of a known grid, if these are its but for the rounding of binary32; else themselves.
 fn known_grid(set: &[DVec3]) -> Vec<DVec3> {
-    let is_grid = |grid: &Vec<DVec3>| grid.iter().zip(set).all(|(a, b)| (*a - *b).length().to_degrees() < images::SAME_DEGREES);
+    let is_grid = |grid: &Vec<DVec3>| grid.iter().zip(set).all(|(&a, &b)| images::degrees_between(a, b) < images::SAME_DEGREES);
     directions::grid(set.len()).filter(is_grid).unwrap_or_else(|| set.to_vec())
 }
 

@@ -89,7 +89,7 @@ pub fn open<'a>(mut stream: Box<dyn Stream + Send + 'a>, memory: usize) -> Resul
 
 impl Opened<'_> {
     /// Whether its numbers are read as XYZ.
-    pub fn is_xyz(&self, colours: Colours) -> bool {
+    fn is_xyz(&self, colours: Colours) -> bool {
         match colours {
             Colours::Auto => self.is_xyz,
             Colours::Rgb => false,

@@ -3,10 +3,10 @@
 //! `NAME/tvTTT_pvPPP/NNNNN tlTTT plPPP tvTTT pvPPP.jpg`: whole degrees in three digits, polar angle and azimuth of light and view, a folder for each view;
 //! `NNNNN` counts the views. Pictures are JPEG of 8 bits in sRGB, so values above 1 are cut and every value has the error of a JPEG.
 
-use super::images::SAME_DEGREES;
+use super::images::{SAME_DEGREES, degrees_between};
 use super::pixels::to_srgb;
 use crate::dataset::Dataset;
-use crate::directions::to_degrees;
+use crate::directions::{from_degrees, to_degrees};
 use crate::error::{Result, ToolError};
 use crate::files::{folder_of, persist};
 use glam::DVec3;
@@ -41,8 +41,7 @@ pub struct Exported {
 fn whole(direction: DVec3) -> ([u32; 2], f64) {
     let [polar, azimuth] = to_degrees(direction).map(f64::round);
     let azimuth = if azimuth >= 360.0 || polar == 0.0 { 0.0 } else { azimuth };
-    let away = (crate::directions::from_degrees(polar, azimuth) - direction.normalize()).length().to_degrees();
-    ([polar as u32, azimuth as u32], away)
+    ([polar as u32, azimuth as u32], degrees_between(from_degrees(polar, azimuth), direction))
 }
 
 /// Writes the archive; `progress` hears how many of how many images are done.
@@ -83,9 +82,7 @@ pub fn export(dataset: &Dataset, path: &Path, options: &Options, progress: &dyn 
     let batch = (options.memory / (texels * EXPORT_BYTES)).clamp(1, pairs);
     for first in (0..pairs).step_by(batch) {
         let count = batch.min(pairs - first);
-        let mut values = vec![0.0f32; texels * count * 3];
-        let runs = values.par_chunks_mut(count * 3).enumerate();
-        runs.try_for_each_init(Vec::new, |bytes, (texel, run)| dataset.read_pairs(texel, first, bytes, run))?;
+        let values = dataset.read_images(first, count)?;
         let made: Vec<std::result::Result<(Vec<u8>, u64), String>> = (0..count)
             .into_par_iter()
             .map(|i| {

@@ -7,7 +7,7 @@
 
 use super::ksvd::{Code, Found, Pursuit, Rows, code_all, code_with, first_atoms, gram, iterate, normalise};
 use crate::baseline::pca::Pca;
-use crate::linear::{clean_registers, product, product_bt};
+use crate::linear::{product, product_bt, solve_symmetric};
 
 /// How to decompose.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -134,14 +134,10 @@ fn solve_atoms(samples: &Rows, codes: &[Code], atoms: usize) -> Rows {
     }
     // A millionth of the mean use: what is hardly used stays near zero instead of growing without bound.
     let ridge = (0..atoms).map(|a| normal[a * atoms + a]).sum::<f64>() / atoms as f64 * 1e-6 + f64::MIN_POSITIVE;
-    let matrix = faer::Mat::from_fn(atoms, atoms, |a, b| normal[a * atoms + b] + if a == b { ridge } else { 0.0 });
-    let right = faer::Mat::from_fn(atoms, dim, |a, d| right[a * dim + d]);
-    let solved = match matrix.llt(faer::Side::Lower) {
-        Ok(factor) => faer::linalg::solvers::Solve::solve(&factor, &right),
-        Err(_) => right,
-    };
-    clean_registers();
-    Rows { dim, values: (0..atoms * dim).map(|i| solved[(i / dim, i % dim)] as f32).collect() }
+    let matrix = |a: usize, b: usize| normal[a * atoms + b] + if a == b { ridge } else { 0.0 };
+    let solved = solve_symmetric(matrix, &right, atoms);
+    let value = |i: usize| solved.as_ref().map_or(right[i], |solved| solved[(i / dim, i % dim)]);
+    Rows { dim, values: (0..atoms * dim).map(|i| value(i) as f32).collect() }
 }
 
 /// Decomposes the components of a dataset.

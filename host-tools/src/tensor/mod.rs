@@ -413,7 +413,7 @@ mod tests {
     use super::*;
     use crate::baseline::pca::pca;
     use crate::baseline::tests::small;
-    use crate::dataset::{Description, Sample, Writer};
+    use crate::dataset::{Description, Sample};
     use crate::measure::{Source, compare};
     use selvedge::Limits;
 
@@ -476,13 +476,7 @@ mod tests {
             let path = folder.path().join("odd.selvset");
             let description =
                 Description { size, lights: grid[..lights].to_vec(), views: grid[..views].to_vec(), sample: Sample::Float, ..Description::default() };
-            let writer = Writer::create(&path, description).expect("created");
-            let count = writer.description().texel_len();
-            for texel in 0..size[0] * size[1] {
-                writer.put(texel, 0, &(0..count).map(|i| value(texel, i)).collect::<Vec<f32>>()).expect("put");
-            }
-            writer.finish().expect("finished");
-            let data = Dataset::open(&path).expect("opened");
+            let data = Dataset::from_fn(&path, description, value).expect("written");
             for domain in [Domain::Log, Domain::Linear] {
                 let components = pca(&data, domain, 8).expect("made");
                 let encoded = encode(&components, &[], &options(Goal::All), |_, _, _| ()).unwrap_or_else(|error| panic!("{name} {domain:?}: {error}"));
