@@ -29,9 +29,11 @@ const WEIGHTS: usize = 1024;
 /// Most quality layers (3.1-13).
 const LAYERS: usize = 8;
 /// Entries of a fibre that are weighed at once.
-const GROUP: usize = 8;
+const GROUP: usize = 16;
 /// Entries of three fibres, and what a last group has behind them.
 const ENTRIES: usize = 3 * FIBRE_LIMIT as usize + GROUP;
+/// ABRDF atoms whose entries are gathered before they are summed, so that memory is read while the ones before are.
+const AHEAD: usize = 4;
 /// The place behind the last entry.
 const END: u16 = u16::MAX;
 
@@ -49,7 +51,9 @@ impl Entries {
 pub(crate) struct Room<'s> {
     table: &'s mut LightTable,
     weights: &'s mut [i32; WEIGHTS],
-    entries: Entries,
+    /// ABRDF atoms that the lists have.
+    atoms: [u16; WEIGHTS],
+    entries: [Entries; AHEAD],
 }
 
 impl<'s> Room<'s> {
@@ -60,7 +64,7 @@ impl<'s> Room<'s> {
     pub fn new(scratch: &'s mut [i32]) -> Option<Room<'s>> {
         scratch.fill(0);
         let (table, rest) = scratch.split_at_mut_checked(TABLE_WORDS)?;
-        Some(Room { table: table.first_chunk_mut()?, weights: rest.first_chunk_mut()?, entries: Entries::NONE })
+        Some(Room { table: table.first_chunk_mut()?, weights: rest.first_chunk_mut()?, atoms: [0; WEIGHTS], entries: [Entries::NONE; AHEAD] })
     }
 }
 
@@ -132,36 +136,86 @@ impl<'a> Atoms<'a> {
         }
     }
 
-    /// Gathers the entries of an ABRDF atom at three views, weighed (12.5-2), and gives the atom's shifts (12.2).
+    /// The fibres of three views, each from its first on, and the views' weights.
     #[inline(always)]
-    fn gather(&self, atom: u32, view: Taps, into: &mut Entries) -> u32 {
-        let Entries { weights, places } = into;
-        // A group at a time, side by side; what a group has behind its fibre is overwritten by the next, or lies behind the end.
-        let mut filled = 0usize;
-        for (view, weight) in [(view.a, view.weight_a_q15), (view.b, view.weight_b_q15), (view.c, view.weight_c_q15)] {
-            let first = (view as usize).wrapping_mul(self.shifts.len()).wrapping_add(atom as usize).wrapping_mul(self.entries);
+    fn rows(&self, view: Taps) -> [Row<'a>; 3] {
+        [(view.a, view.weight_a_q15), (view.b, view.weight_b_q15), (view.c, view.weight_c_q15)].map(|(view, weight)| {
+            let first = (view as usize).wrapping_mul(self.shifts.len()).wrapping_mul(self.entries);
+            Row { fibres: self.fibres.get(first..).unwrap_or(&[]), weight }
+        })
+    }
+
+    /// Whether all fibres of the views are within a group, and have one behind them in the file, as nearly all have.
+    #[inline(always)]
+    fn are_short(&self, rows: &[Row<'a>; 3]) -> bool {
+        let most = self.shifts.len().wrapping_mul(self.entries).wrapping_add(GROUP);
+        self.entries <= GROUP && rows.iter().all(|row| row.fibres.len() >= most)
+    }
+
+    /// Gathers the entries of an ABRDF atom at three views, weighed (12.5-2), and gives the atom's shifts (12.2).
+    // What a group has behind its fibre is overwritten by the next, or lies behind the end.
+    #[inline(always)]
+    fn gather<const SHORT: bool>(&self, atom: u32, rows: &[Row<'a>; 3], into: &mut Entries) -> u32 {
+        let first = (atom as usize).wrapping_mul(self.entries);
+        let mut at = 0usize;
+        for row in rows {
             let mut done = 0usize;
-            while done < self.entries {
-                let rest = self.fibres.get(first.wrapping_add(done)..).unwrap_or(&[]);
-                let group = match rest.first_chunk::<GROUP>() {
-                    Some(group) => group.map(u16::from_le_bytes),
-                    None => last_group(rest),
-                };
-                let at = filled.wrapping_add(done);
-                let slots = (weights.get_mut(at..).and_then(<[i32]>::first_chunk_mut), places.get_mut(at..).and_then(<[u16]>::first_chunk_mut));
-                if let (Some(weights), Some(places)) = slots {
-                    *weights = group.map(|entry| ((entry & !self.index_mask) as i16 as i32).wrapping_mul(weight).wrapping_add(0x10000) >> 17);
-                    *places = group.map(|entry| (entry & self.index_mask).wrapping_mul(3));
+            while done < if SHORT { 1 } else { self.entries } {
+                let rest = row.fibres.get(first.wrapping_add(done)..).unwrap_or(&[]);
+                match rest.first_chunk() {
+                    Some(group) => self.weigh(group, row.weight, into, at.wrapping_add(done)),
+                    None if SHORT => {}
+                    None => self.weigh(&last_group(rest), row.weight, into, at.wrapping_add(done)),
                 }
                 done = done.wrapping_add(GROUP);
             }
-            filled = filled.wrapping_add(self.entries);
+            at = at.wrapping_add(self.entries);
         }
-        if let Some(end) = places.get_mut(filled) {
+        if let Some(end) = into.places.get_mut(at) {
             *end = END;
         }
         self.shifts.get(atom as usize).map_or(0, |bytes| u32::from_le_bytes(*bytes))
     }
+
+    /// Weighs a group of entries, side by side.
+    #[inline(always)]
+    fn weigh(&self, group: &[[u8; 2]; GROUP], weight: i32, into: &mut Entries, at: usize) {
+        let group = group.map(u16::from_le_bytes);
+        let slots = (into.weights.get_mut(at..).and_then(<[i32]>::first_chunk_mut), into.places.get_mut(at..).and_then(<[u16]>::first_chunk_mut));
+        if let (Some(weights), Some(places)) = slots {
+            *weights = group.map(|entry| ((entry & !self.index_mask) as i16 as i32).wrapping_mul(weight).wrapping_add(0x10000) >> 17);
+            *places = group.map(|entry| (entry & self.index_mask).wrapping_mul(3));
+        }
+    }
+
+    /// The ABRDF atoms of a sample, weighed (12.5-5); the weights are zero afterwards.
+    #[inline(always)]
+    fn total<const SHORT: bool>(
+        &self,
+        met: &[u16],
+        rows: &[Row<'a>; 3],
+        table: &LightTable,
+        weights: &mut [i32; WEIGHTS],
+        entries: &mut [Entries; AHEAD],
+    ) -> Lanes {
+        let mut total = [0i32; 4];
+        for met in met.chunks(AHEAD) {
+            let mut shifts = [0; AHEAD];
+            for ((&atom, shifts), entries) in met.iter().zip(&mut shifts).zip(entries.iter_mut()) {
+                *shifts = self.gather::<SHORT>(atom as u32, rows, entries);
+            }
+            for ((&atom, shifts), entries) in met.iter().zip(shifts).zip(entries.iter()) {
+                add_atom(entries, table, shifts, core::mem::take(&mut weights[atom as usize & (WEIGHTS - 1)]), &mut total);
+            }
+        }
+        total
+    }
+}
+
+/// Fibres of a view.
+struct Row<'a> {
+    fibres: &'a [[u8; 2]],
+    weight: i32,
 }
 
 /// [`round_shift`] of four lanes, without a branch, so that they stay one vector.
@@ -200,9 +254,9 @@ fn add_atom(entries: &Entries, table: &LightTable, shifts: u32, weight: i32, tot
 
 /// The group of a fibre that ends less than a group before the file does.
 #[cold]
-fn last_group(rest: &[[u8; 2]]) -> [u16; GROUP] {
-    let mut group = [0; GROUP];
-    group.iter_mut().zip(rest).for_each(|(slot, entry)| *slot = u16::from_le_bytes(*entry));
+fn last_group(rest: &[[u8; 2]]) -> [[u8; 2]; GROUP] {
+    let mut group = [[0; 2]; GROUP];
+    group.iter_mut().zip(rest).for_each(|(slot, entry)| *slot = *entry);
     group
 }
 
@@ -245,6 +299,29 @@ impl<'a> Lists<'a> {
             shift: head >> 24,
             atom_count: word(words, material.fibres_start),
         }
+    }
+
+    /// Adds up the weights of the ABRDF atoms that the lists of the texels have (12.5-4), and gives how many they are. There is no merge, since sums
+    /// have no order; an atom whose weight was zero is met anew, which adds nothing twice: it is taken once, and is zero then.
+    // Apart, for the registers.
+    #[inline(never)]
+    fn merge(&self, width: u32, x: [(u32, i32); 2], y: [(u32, i32); 2], weights: &mut [i32; WEIGHTS], atoms: &mut [u16; WEIGHTS]) -> usize {
+        let mut met = 0usize;
+        for (row, weight_y) in y {
+            for (column, weight_x) in x {
+                if weight_x == 0 || weight_y == 0 {
+                    continue;
+                }
+                for (atom, coefficient) in self.list(row.wrapping_mul(width).wrapping_add(column)) {
+                    let atom = atom as usize & (WEIGHTS - 1);
+                    let weight = weights[atom];
+                    atoms[met & (WEIGHTS - 1)] = atom as u16;
+                    met = met.wrapping_add((weight == 0) as usize);
+                    weights[atom] = weight.wrapping_add(corner_weight(coefficient, weight_x, weight_y));
+                }
+            }
+        }
+        met
     }
 
     /// The list of a texel (12.4).
@@ -318,39 +395,22 @@ impl<'a, 's> TensorSampler<'a, 's> {
 
     /// [`crate::tensor::textures_q20`] at level 0, the same bits.
     pub fn textures(&self, selvedge: &Selvedge<'a>, u_q32: u32, v_q32: u32, light: Taps, view: Taps, room: &mut Room<'_>) -> Values {
-        let Room { table, weights, entries } = room;
+        let Room { table, weights, atoms, entries } = room;
         let material = selvedge.material();
         let axis = |size: u32, position: u32| two_texels(axis_at_position(material.edge, material.edge_reciprocal_q18, size, position));
         let (x, y) = (axis(material.width, u_q32), axis(material.height, v_q32));
         self.atoms.blend_unpacked(self.lights, light, table);
+        let rows = self.atoms.rows(view);
+        let short = self.atoms.are_short(&rows);
         let mut sums = [0i32; 4];
         for layer in 0..material.layer_limit {
             let lists = Lists::of(selvedge, 0, layer);
-            // The weights of all ABRDF atoms that the four lists have; where they stand needs no merge, since sums have no order.
-            let mut used = [0u64; WEIGHTS / 64];
-            for (row, weight_y) in y {
-                for (column, weight_x) in x {
-                    if weight_x == 0 || weight_y == 0 {
-                        continue;
-                    }
-                    for (atom, coefficient) in lists.list(row.wrapping_mul(material.width).wrapping_add(column)) {
-                        let atom = atom as usize & (WEIGHTS - 1);
-                        used[atom >> 6] |= 1 << (atom & 63);
-                        weights[atom] = weights[atom].wrapping_add(corner_weight(coefficient, weight_x, weight_y));
-                    }
-                }
-            }
-            let mut total = [0i32; 4];
-            for (word, &bits) in used.iter().enumerate() {
-                let mut bits = bits;
-                while bits != 0 {
-                    let atom = word << 6 | bits.trailing_zeros() as usize;
-                    bits &= bits.wrapping_sub(1);
-                    let weight = core::mem::take(&mut weights[atom & (WEIGHTS - 1)]);
-                    let shifts = self.atoms.gather(atom as u32, view, entries);
-                    add_atom(entries, table, shifts, weight, &mut total);
-                }
-            }
+            let met = lists.merge(material.width, x, y, weights, atoms);
+            let met = atoms.get(..met).unwrap_or(&[]);
+            let total = match short {
+                true => self.atoms.total::<true>(met, &rows, table, weights, entries),
+                false => self.atoms.total::<false>(met, &rows, table, weights, entries),
+            };
             for (sum, part) in sums.iter_mut().zip(to_q20(total, lists.shift)) {
                 *sum = sum.wrapping_add(part);
             }
@@ -372,9 +432,10 @@ pub(crate) fn image_textures(selvedge: &Selvedge<'_>, level: u32, light: Taps, v
     let mut table = [0; TABLE_WORDS];
     atoms.blend_lights(light, &mut table);
     let values = scratch.as_chunks_mut::<4>().0;
+    let rows = atoms.rows(view);
     let mut entries = Entries::NONE;
     for (atom, slot) in (0..atoms.shifts.len() as u32).zip(values.iter_mut()) {
-        let shifts = atoms.gather(atom, view, &mut entries);
+        let shifts = atoms.gather::<false>(atom, &rows, &mut entries);
         let [c0, c1, c2, _] = angular(&entries, &table, shifts & 31);
         *slot = [c0, c1, c2, ((shifts >> 5) & 31) as i32];
     }
