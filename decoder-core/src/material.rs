@@ -128,3 +128,47 @@ pub fn level_size(size: u32, level: u32) -> u32 {
     // 9.1-1: never zero, since sizes are at least one.
     size.wrapping_add((1u32 << level).wrapping_sub(1)) >> level
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_of_a_record_are_its_fields_in_order() {
+        let channel = |first: u32| Channel {
+            state: first,
+            mean_start: first + 1,
+            scale_start: first + 2,
+            full_rank: first + 3,
+            angular_start: first + 4,
+            spatial_start: first + 5,
+            atoms_start: first + 6,
+        };
+        let material = Material {
+            file_start: 0,
+            width: 1,
+            height: 2,
+            level_count: 3,
+            light_count: 4,
+            view_count: 5,
+            light_start: 6,
+            view_start: 7,
+            transfer: 8,
+            cosine_included: 9,
+            offset_mantissa_q31: 10,
+            exponent: 11,
+            matrix_q13: [12, 13, 14, 15, 16, 17, 18, 19, 20],
+            edge: 21,
+            edge_reciprocal_q18: 22,
+            layer_count: 23,
+            layer_limit: 24,
+            full_count: 25,
+            coefficient_entry: 26,
+            method: 27,
+            light_atoms_start: 28,
+            fibres_start: 29,
+            channels: [channel(30), channel(37), channel(44)],
+        };
+        assert_eq!(material.to_words(), core::array::from_fn(|n| n as u32));
+    }
+}

@@ -140,6 +140,28 @@ mod tests {
     }
 
     #[test]
+    fn texels_equal_wide_products() {
+        let mut state = 3u32;
+        for size in 1..4_000 {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            for position in [0, state, u32::MAX] {
+                assert_eq!(texel_at_position(size, position), ((position as u64 * size as u64) >> 32) as u32);
+            }
+        }
+    }
+
+    #[test]
+    fn a_centre_is_its_texel_alone() {
+        for exponent in 0..=14u32 {
+            let size = 1 << exponent;
+            for texel in (0..size).step_by(1.max(size as usize / 64)) {
+                let axis = axis_at_position(1, 1 << 18, size, (2 * texel + 1) << (31 - exponent));
+                assert_eq!((axis.first.block, axis.first.weight_a_q15), (texel, ONE_Q15), "{texel} of {size}");
+            }
+        }
+    }
+
+    #[test]
     fn weights_sum_to_one_and_texels_are_in_range() {
         let mut state = 7u32;
         for i in 0..200_000u32 {

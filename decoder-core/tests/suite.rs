@@ -78,19 +78,73 @@ fn fast_paths_agree(material: &Selvedge<'_>) {
 
 /// A sample direction is found, alone and whole; on the horizon no light arrives (5.1-4, 5.6-3).
 fn sample_directions_are_found(material: &Selvedge<'_>) {
-    let (words, start) = (material.words(), material.material().light_start);
-    for i in 0..material.header().light_count {
-        let pair = selvedge::direction::point(words, start, i);
-        let asked = material.light_direction(i);
-        assert_eq!([asked.x_q18, asked.y_q18], [(pair as u16 as i16 as i32) * 16, ((pair >> 16) as u16 as i16 as i32) * 16]);
-        let taps = material.locate_light(asked);
-        let own: i32 = [(taps.a, taps.weight_a_q15), (taps.b, taps.weight_b_q15), (taps.c, taps.weight_c_q15)].iter().filter(|t| t.0 == i).map(|t| t.1).sum();
-        assert_eq!((own, taps.weight_a_q15 + taps.weight_b_q15 + taps.weight_c_q15), (32_768, 32_768));
-        for (z_q15, lit) in [(0, false), (-1, false), (asked.z_q15, asked.z_q15 > 0)] {
-            assert_eq!(material.locate_light(Direction { z_q15, ..asked }).cosine_q15 > 0, lit, "{z_q15}");
+    let (header, m) = (material.header(), material.material());
+    for (is_light, start, count) in [(true, m.light_start, header.light_count), (false, m.view_start, header.view_count)] {
+        let direction = |i: u32| if is_light { material.light_direction(i) } else { material.view_direction(i) };
+        let locate = |asked: Direction| if is_light { material.locate_light(asked) } else { material.locate_view(asked) };
+        for i in 0..count {
+            let pair = selvedge::direction::point(material.words(), start, i);
+            let asked = direction(i);
+            assert_eq!([asked.x_q18, asked.y_q18], [(pair as u16 as i16 as i32) * 16, ((pair >> 16) as u16 as i16 as i32) * 16]);
+            let taps = locate(asked);
+            let all = [(taps.a, taps.weight_a_q15), (taps.b, taps.weight_b_q15), (taps.c, taps.weight_c_q15)];
+            let own: i32 = all.iter().filter(|t| t.0 == i).map(|t| t.1).sum();
+            assert_eq!((own, taps.weight_a_q15 + taps.weight_b_q15 + taps.weight_c_q15), (32_768, 32_768));
+            for (z_q15, lit) in [(0, false), (-1, false), (asked.z_q15, asked.z_q15 > 0)] {
+                assert_eq!(!is_light || locate(Direction { z_q15, ..asked }).cosine_q15 > 0, !is_light || lit, "{z_q15}");
+            }
+            assert_eq!(direction(u32::MAX), direction(count - 1));
         }
-        assert_eq!(material.light_direction(u32::MAX), material.light_direction(material.header().light_count - 1));
     }
+}
+
+/// Behind other words and a dictionary before or behind it, a file gives the same, by the record for that place.
+fn place_does_not_matter(material: &Selvedge<'_>, file: &[u8], dictionary: &[u8]) {
+    use selvedge::interpolation::{filtered_values, locate_light, locate_view, point_values, radiance};
+    for is_behind in [true, false] {
+        let (mut buffer, mut starts) = (vec![0xa5; 20], [0; 2]);
+        for part in if is_behind { [0, 1] } else { [1, 0] } {
+            starts[part] = buffer.len() as u32 / 4;
+            buffer.extend([file, dictionary][part]);
+            buffer.extend([0x5a; 12]);
+        }
+        let words = selvedge::words::Words { file: &buffer, dictionary: &[] };
+        let placed = material.material_at(starts[0], starts[1]);
+        for i in 0..24u32 {
+            let (u, v) = (i.wrapping_mul(0x9e37_79b9), i.wrapping_mul(0x85eb_ca6b));
+            let (x, y, light, view) = (u % placed.width, v % placed.height, (u >> 3) % placed.light_count, (v >> 3) % placed.view_count);
+            assert_eq!(point_values(words, &placed, x, y, light, view), material.point_values(x, y, light, view));
+            let (light, view) = (material.light_direction(light), material.view_direction(view));
+            let (own_light, own_view) = (locate_light(words, &placed, light), locate_view(words, &placed, view));
+            let values = filtered_values(words, &placed, placed.level_count - 1, u, v, own_light, own_view);
+            let wanted =
+                filtered_values(material.words(), material.material(), placed.level_count - 1, u, v, material.locate_light(light), material.locate_view(view));
+            assert_eq!(radiance(&placed, values, own_light), radiance(material.material(), wanted, own_light));
+        }
+    }
+}
+
+/// The sections are those of the directory's bytes (3.2), and the metadata what their bytes say (3.4).
+fn what_a_file_holds_is_told(material: &Selvedge<'_>, file: &[u8]) {
+    let word = |at: usize| u32::from_le_bytes(*file[at..].first_chunk().expect("a word"));
+    let mut sections = 0;
+    for (n, section) in material.sections().enumerate() {
+        let entry = 128 + 16 * n;
+        assert_eq!([section.kind | section.instance << 16, section.offset, section.length], [word(entry), word(entry + 4), word(entry + 8)]);
+        if section.kind == 1 {
+            let (metadata, at) = (material.metadata(), section.offset as usize);
+            let codes = [metadata.texel_width_nm, metadata.texel_height_nm, metadata.frame, metadata.image_origin, metadata.primaries];
+            assert_eq!(codes, [0, 4, 8, 12, 16].map(|field| word(at + field)));
+            let mut text = at + 32;
+            for told in [metadata.name, metadata.origin, metadata.licence] {
+                let length = word(text) as usize;
+                assert_eq!(told.as_bytes(), &file[text + 4..text + 4 + length]);
+                text += 4 + length.next_multiple_of(4);
+            }
+        }
+        sections += 1;
+    }
+    assert_eq!(sections, material.header().section_count);
 }
 
 #[test]
@@ -120,6 +174,8 @@ fn the_suite_is_answered_as_stated() {
                 assert_eq!(hex(&material.decode_digest()), columns[3], "{}", columns[1]);
                 fast_paths_agree(material);
                 sample_directions_are_found(material);
+                place_does_not_matter(material, &file, dictionary.as_deref().unwrap_or(&[]));
+                what_a_file_holds_is_told(material, &file);
             }
         } else {
             let finding = first.0.unwrap_or_else(|| panic!("{}: nothing is found", columns[1]));
@@ -134,6 +190,14 @@ fn the_suite_is_answered_as_stated() {
         count += 1;
     }
     assert!(count > 200, "{count}");
+}
+
+#[test]
+fn the_examples_say_what_they_are() {
+    let file = read("valid/tensor-example.selv");
+    let material = selvedge::open(&file, &Limits::NONE).expect("legal");
+    let metadata = material.metadata();
+    assert_eq!([metadata.name, metadata.origin, metadata.licence], ["tensor example", "the specification", "CC0-1.0"]);
 }
 
 /// What makes queries and shows answers, beside the arithmetic.
