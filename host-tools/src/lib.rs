@@ -17,7 +17,7 @@
 //! | [`blend`](mod@blend), [`basis`] | a material between two |
 //! | [`story`], [`progress`] | the encoder's part of the demo; a line on a terminal |
 //! | [`validate`](mod@validate) | every finding of a file, in words |
-//! | [`inspect`], [`explain`](mod@explain), [`picture`], [`demo`] | what `info`, `explain`, `decode` and `demo` show |
+//! | [`inspect`], [`explain`](mod@explain), [`picture`], [`show`], [`demo`] | what `info`, `explain`, `decode` and `demo` show |
 //! | [`kernel`], [`gpu`] | the kernel for other renderers, and run here |
 //! | [`example`], [`extreme`], [`random`] | files that the specification and the tests use |
 //! | [`count`] | the price of a sample, walked |
@@ -61,6 +61,7 @@ pub mod random;
 pub mod read;
 pub mod report;
 pub mod sector;
+pub mod show;
 pub mod similarity;
 pub mod sparsebtf;
 pub mod speed;

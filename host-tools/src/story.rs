@@ -2,7 +2,6 @@
 //! them, measured against its data, and shown.
 
 use crate::dataset::{Dataset, Sample};
-use crate::demo::render_ball;
 use crate::dictionary_file::{self, Training};
 use crate::encode::driver::{Event, Verified, Wish, encode_verified};
 use crate::encode::{Options, prepare};
@@ -10,6 +9,7 @@ use crate::error::{Result, ToolError};
 use crate::measure::{self, Source};
 use crate::model::{MetadataModel, TransferModel};
 use crate::picture::{Picture, beside_error};
+use crate::show::render_ball;
 use crate::synth::{Mesostructure, Request, synthesise};
 use crate::{files, pyramid, train};
 use selvedge::Limits;

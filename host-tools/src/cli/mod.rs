@@ -8,7 +8,7 @@ mod measuring;
 
 use crate::error::{Result, ToolError};
 use crate::foreign::{self, Kind};
-use crate::{conform, demo, explain, files, inspect, kernel, sparsebtf, validate, vectors, write};
+use crate::{conform, demo, explain, files, inspect, kernel, show, sparsebtf, validate, vectors, write};
 use clap::{Args, Parser, Subcommand};
 use selvedge::header::CONTENT_DICTIONARY;
 use selvedge::{Direction, Limits};
@@ -399,7 +399,7 @@ fn run(cli: Cli) -> Result<u8> {
                 return Err(ToolError::Usage(format!("{name}: this file has {low} to {high}")));
             }
             let material = layers.map_or(material, |layers| material.with_layers(layers));
-            let picture = demo::decode_picture(&material, level, light, view)?;
+            let picture = show::decode_picture(&material, level, light, view)?;
             let is_exr = output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("exr"));
             let picture = if is_exr { picture } else { picture.exposed(exposure) };
             picture.save(&output).map(|()| 0)
