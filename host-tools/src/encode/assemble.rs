@@ -9,10 +9,12 @@ use crate::error::{Result, ToolError};
 use crate::linear::Basis;
 use crate::model::{
     AtomModel, ChannelModel, CoefficientsModel, DictionaryModel, EnsembleModel, FactorModel, MaterialModel, MetadataModel, PairTableModel, RecordModel,
+    TransferModel,
 };
 use crate::quantise::{FloatRecord, Quantised, quantise, quantise_means};
 use crate::transfer::matrix_q13;
 use crate::triangulate::{project, triangulate};
+use glam::DVec3;
 use selvedge::cost::{Shape, filtered_operations};
 use selvedge::ensemble::dequantise;
 
@@ -121,23 +123,34 @@ pub fn material(setting: &Setting<'_>, ensembles: &[Ensemble; 3], candidates: &[
             coefficients.resize(layers, empty);
         }
     }
-    let same = description.lights == description.views;
     let model = MaterialModel {
-        size: description.size.map(|n| n as u32),
         level_count: setting.prepared.levels.len() as u32,
         edge: setting.options.edge as u32,
         layer_count: layers as u32,
-        transfer: setting.prepared.forward.transfer,
+        channels,
+        ..described(description, setting.prepared.forward.transfer)
+    };
+    Ok((model, rounding))
+}
+
+/// What a dataset says of its material, which has no channel yet: one level, one layer, blocks of one texel.
+pub fn described(description: &Description, transfer: TransferModel) -> MaterialModel {
+    let points = |directions: &[DVec3]| directions.iter().map(|&d| project(d)).collect();
+    MaterialModel {
+        size: description.size.map(|n| n as u32),
+        level_count: 1,
+        edge: 1,
+        layer_count: 1,
+        transfer,
         cosine_included: description.cosine_included,
         matrix_q13: matrix_q13(),
         metadata: MetadataModel { texel_nm: description.texel_nm, frame: 0, image_origin: 0, primaries: 0, texts: description.texts.clone() },
-        lights: description.lights.iter().map(|&d| project(d)).collect(),
-        views: (!same).then(|| description.views.iter().map(|&d| project(d)).collect()),
-        channels,
+        lights: points(&description.lights),
+        views: (description.lights != description.views).then(|| points(&description.views)),
+        channels: Default::default(),
         tensor: None,
         extras: Vec::new(),
-    };
-    Ok((model, rounding))
+    }
 }
 
 fn channel(setting: &Setting<'_>, ensemble: &Ensemble, candidates: &[&Candidates], selection: &Selection, bits: Option<u32>) -> Result<(EnsembleModel, f64)> {

@@ -164,16 +164,14 @@ pub fn fit(pca: &Pca<'_>, shape: Shape, training: Training, mut tell: impl FnMut
         weights = uses(&codes, shape.abrdf_atoms);
         let fibres = fibre_samples(&lifted, views, &weights);
         // The second K-SVD, and one more step of it in every round.
-        let iterations = if round == 0 { training.iterations } else { 1 };
-        if round == 0 {
+        let (stage, begun, iterations, of) = if round == 0 {
             light = first_atoms(&fibres, shape.light_atoms, training.seed + 1);
-        }
+            ("light atoms", 0, training.iterations, training.iterations)
+        } else {
+            ("rounds", round, 1, training.rounds + 1)
+        };
         for i in 0..iterations {
-            tell(
-                if round == 0 { "light atoms" } else { "rounds" },
-                if round == 0 { i } else { round },
-                if round == 0 { iterations } else { training.rounds + 1 },
-            );
+            tell(stage, begun + i, of);
             trained.add(iterate(&fibres, &mut light, fibre_pursuit));
         }
         fibre_codes = code_all(&fibres, &light, fibre_pursuit);

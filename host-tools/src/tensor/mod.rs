@@ -10,12 +10,11 @@ pub mod ksvd;
 
 use crate::baseline::pca::{Domain, Pca};
 use crate::dataset::Dataset;
-use crate::encode::assemble::mean_tables;
+use crate::encode::assemble::{described, mean_tables};
 use crate::error::{Result, ToolError};
 use crate::linear::{ordered, product_bt};
-use crate::model::{ChannelModel, ListsModel, MaterialModel, MetadataModel, TensorModel, TransferModel};
-use crate::transfer::{Forward, matrix_q13};
-use crate::triangulate::project;
+use crate::model::{ChannelModel, ListsModel, MaterialModel, TensorModel, TransferModel};
+use crate::transfer::Forward;
 use crate::write::write_material;
 use fit::{Fit, Shape, Trained, Training, fit};
 use integers::{Atoms, Quantiser};
@@ -250,21 +249,11 @@ pub fn encode_fit(pca: &Pca<'_>, fitted: &Fit, coarser: &[&Dataset], options: &O
                 fibres: atoms.fibres(),
                 lists: per_level.into_iter().map(|lists| vec![ListsModel { value_bits, shift, lists }]).collect(),
             };
-            let same = description.lights == description.views;
             let model = MaterialModel {
-                size: description.size.map(|n| n as u32),
                 level_count: levels.len() as u32,
-                edge: 1,
-                layer_count: 1,
-                transfer,
-                cosine_included: description.cosine_included,
-                matrix_q13: matrix_q13(),
-                metadata: MetadataModel { texel_nm: description.texel_nm, frame: 0, image_origin: 0, primaries: 0, texts: description.texts.clone() },
-                lights: description.lights.iter().map(|&d| project(d)).collect(),
-                views: (!same).then(|| description.views.iter().map(|&d| project(d)).collect()),
                 channels: std::array::from_fn(|c| ChannelModel { mean: Some(tables[c].clone()), ..ChannelModel::default() }),
                 tensor: Some(tensor),
-                extras: Vec::new(),
+                ..described(description, transfer)
             };
             let bytes = write_material(&model);
             (model, bytes, lists.swap_remove(0))
