@@ -30,9 +30,9 @@ const WEIGHTS: usize = 1024;
 const LAYERS: usize = 8;
 /// Entries of a fibre that are weighed at once.
 const GROUP: usize = 16;
-/// Entries of three fibres, and what a last group has behind them.
+/// Entries of three fibres, and what a last group has behind them; the end is marked there.
 const ENTRIES: usize = 3 * FIBRE_LIMIT as usize + GROUP;
-/// ABRDF atoms whose entries are gathered before they are summed, so that memory is read while the ones before are.
+/// ABRDF atoms whose entries are gathered before they are summed, so that memory is read meanwhile.
 const AHEAD: usize = 4;
 /// The place behind the last entry.
 const END: u16 = u16::MAX;
@@ -51,7 +51,7 @@ impl Entries {
 pub(crate) struct Room<'s> {
     table: &'s mut LightTable,
     weights: &'s mut [i32; WEIGHTS],
-    /// ABRDF atoms that the lists have.
+    /// ABRDF atoms that the lists have, some more than once.
     atoms: [u16; WEIGHTS],
     entries: [Entries; AHEAD],
 }
@@ -200,19 +200,24 @@ impl<'a> Atoms<'a> {
     ) -> Lanes {
         let mut total = [0i32; 4];
         for met in met.chunks(AHEAD) {
-            let mut shifts = [0; AHEAD];
-            for ((&atom, shifts), entries) in met.iter().zip(&mut shifts).zip(entries.iter_mut()) {
-                *shifts = self.gather::<SHORT>(atom as u32, rows, entries);
+            let mut used = [(0, 0); AHEAD];
+            for ((&atom, used), entries) in met.iter().zip(&mut used).zip(entries.iter_mut()) {
+                let weight = core::mem::take(&mut weights[atom as usize & (WEIGHTS - 1)]);
+                if weight != 0 {
+                    *used = (weight, self.gather::<SHORT>(atom as u32, rows, entries));
+                }
             }
-            for ((&atom, shifts), entries) in met.iter().zip(shifts).zip(entries.iter()) {
-                add_atom(entries, table, shifts, core::mem::take(&mut weights[atom as usize & (WEIGHTS - 1)]), &mut total);
+            for ((weight, shifts), entries) in used.into_iter().zip(entries.iter()) {
+                if weight != 0 {
+                    add_atom(entries, table, shifts, weight, &mut total);
+                }
             }
         }
         total
     }
 }
 
-/// Fibres of a view.
+/// What the file holds from the first fibre of a view on, and the view's weight.
 struct Row<'a> {
     fibres: &'a [[u8; 2]],
     weight: i32,
@@ -279,7 +284,7 @@ struct Reader<'a> {
     value_bits: u32,
     field_bit: u32,
     ones: Ones<'a>,
-    /// The first bit of the high parts, and the ones that were taken.
+    /// The number of the first bit of the high parts plus that of the ones that were taken.
     taken: u32,
 }
 
@@ -301,8 +306,8 @@ impl<'a> Lists<'a> {
         }
     }
 
-    /// Adds up the weights of the ABRDF atoms that the lists of the texels have (12.5-4), and gives how many they are. There is no merge, since sums
-    /// have no order; an atom whose weight was zero is met anew, which adds nothing twice: it is taken once, and is zero then.
+    /// Adds up the weights of the ABRDF atoms that the lists of the texels have (12.5-4), notes the atoms, and gives the number of notes. An atom is
+    /// noted when its weight is zero, so one whose weight passes through zero is noted again: who takes the weights finds zero at all notes but one.
     // Apart, for the registers.
     #[inline(never)]
     fn merge(&self, width: u32, x: [(u32, i32); 2], y: [(u32, i32); 2], weights: &mut [i32; WEIGHTS], atoms: &mut [u16; WEIGHTS]) -> usize {
@@ -354,7 +359,7 @@ impl Iterator for Reader<'_> {
         self.taken = self.taken.wrapping_add(1);
         let field = window(self.stream, self.field_bit) as u32;
         self.field_bit = self.field_bit.wrapping_add(self.low_bits).wrapping_add(self.value_bits);
-        // Widths of a checked file are below sixteen; the masks are for others.
+        // Widths of a checked file are below sixteen; the masks tell the compiler.
         let (low_bits, value_bits) = (self.low_bits & 15, self.value_bits & 15);
         let value = low_part(field >> low_bits, value_bits);
         Some(((high << low_bits) | low_part(field, low_bits), list_coefficient(value, value_bits)))

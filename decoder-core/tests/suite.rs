@@ -37,6 +37,11 @@ fn fast_paths_agree(material: &Selvedge<'_>) {
         queries.push(FilteredQuery { u_q32: next(), v_q32: next(), light, view });
         queries.push(FilteredQuery { u_q32: next(), v_q32: next(), light: Direction { z_q15: 0, ..light }, view: Direction { z_q15: 0, ..view } });
     }
+    // At centres, edges and half way between texels, where neighbours weigh the same or nothing.
+    for i in 0..16u32 {
+        let (light, view) = (queries[i as usize].light, queries[i as usize].view);
+        queries.push(FilteredQuery { u_q32: (i & 3) << 30, v_q32: (i >> 2) << 30, light, view });
+    }
     let mut scratch = vec![-1; material.batch_scratch_len(queries.len())];
     let mut out = vec![Rgb::default(); queries.len()];
     material.sample_batch(&queries, &mut scratch, &mut out).expect("buffers fit");
