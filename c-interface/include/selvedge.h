@@ -124,7 +124,7 @@ typedef struct selvedge_header {
     uint32_t minor_version;
     uint32_t file_length; /* bytes */
     uint32_t content;     /* 0: a material */
-    uint32_t method;      /* 1: the sparse ensemble */
+    uint32_t method;      /* 1: the sparse ensemble, 2: the sparse tensor */
     uint32_t section_count;
     uint32_t operations;         /* 32-bit multiplications of a filtered sample, at worst */
     uint32_t width;              /* texels along x, 1 to 16384 */

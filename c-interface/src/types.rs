@@ -160,7 +160,7 @@ pub struct selvedge_header {
     pub file_length: u32,
     /// 0 for a material.
     pub content: u32,
-    /// 1 for the sparse ensemble.
+    /// 1 for the sparse ensemble, 2 for the sparse tensor.
     pub method: u32,
     /// Entries of the directory.
     pub section_count: u32,

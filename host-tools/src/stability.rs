@@ -783,7 +783,7 @@ fn materials() -> Vec<Case> {
                     "materials",
                     format!("{method_name}, {of}: {name}"),
                     "largest over least value above zero",
-                    "the error that the encoder states of whole blocks, or that of means alone if it is less, 5 % more, and 2^-12 of the range of the coded domain",
+                    "the error that the encoder states of whole blocks, or half of what means alone leave if it is less, 5 % more, and 2^-12 of the range of the coded domain",
                     move |folder| {
                         let set = directions::grid(81).expect("known");
                         let data = dataset(folder, size, &set[..lights], &set[..views], value)?;
@@ -802,7 +802,7 @@ fn materials() -> Vec<Case> {
                             .filter(|v| *v > 0.0)
                             .fold(f32::MAX, f32::min) as f64;
                         let condition = if largest > 0.0 { largest / least } else { 0.0 };
-                        // An encoder that states much is not excused: what the means alone would leave is the most.
+                        // An encoder that states much is not excused: half of what the means alone would leave is the most.
                         let values = |t: usize, i: usize| {
                             let value = value(t, i / 3 % lights, i / 3 / lights, i % 3) as f64;
                             if domain == Domain::Log { (value + offset as f64).ln() } else { value }
@@ -813,7 +813,7 @@ fn materials() -> Vec<Case> {
                             (0..texels).map(|t| (values(t, i) - mean).powi(2)).sum::<f64>()
                         };
                         let of_means = ((0..columns).map(spread).sum::<f64>() / (texels * columns) as f64).sqrt();
-                        Ok(Outcome { condition, bound: stated.min(of_means) * 1.05 + range * 2f64.powi(-12), measured })
+                        Ok(Outcome { condition, bound: stated.min(of_means / 2.0) * 1.05 + range * 2f64.powi(-12), measured })
                     },
                 ));
             }

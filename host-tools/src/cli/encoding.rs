@@ -114,7 +114,7 @@ pub struct EncodeArgs {
     /// Sparse tensor: light atoms, ABRDF atoms, entries of a fibre and coefficients of a texel, as 64,128,8,10; chosen if not given
     #[arg(long, value_parser = parse_shape)]
     shape: Option<[usize; 4]>,
-    /// Sparse tensor: components that training works in; memory grows with them, not with the data
+    /// Sparse tensor: components that training works in; memory grows with them times the texels
     #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u16).range(1..=2048))]
     rank: u16,
     /// Sparse tensor: memory of its decomposition, in MB; the less, the fewer parts at once, and then the fewer components
@@ -336,19 +336,27 @@ fn by_tensor(args: &EncodeArgs, data: &Dataset, coarser: &[Dataset], transfer: D
     tell("components", 0, 1);
     let components = pca::pca_within(data, transfer.of_components(), args.rank as usize, args.memory as usize * 1_000_000)?;
     let training = tensor::fit::Training::default();
-    let shape = match args.shape {
-        Some([light_atoms, abrdf_atoms, entries, coefficients]) => tensor::fit::Shape { light_atoms, abrdf_atoms, entries, coefficients },
-        None => tensor::Trials::new(&components, training, tell).choose(1 + coarser.len(), goal),
-    };
-    let fitted = tensor::fit::fit(&components, shape, training, tell);
     let coarser: Vec<&Dataset> = coarser.iter().collect();
+    let value_bits = args.value_bits.map(|bits| bits[0]);
+    let (shape, fitted, mut first) = match args.shape {
+        Some([light_atoms, abrdf_atoms, entries, coefficients]) => {
+            let shape = tensor::fit::Shape { light_atoms, abrdf_atoms, entries, coefficients };
+            (shape, tensor::fit::fit(&components, shape, training, tell), None)
+        }
+        None => {
+            let (shape, fitted, encoded) = tensor::Trials::new(&components, training, tell).encode(&coarser, goal, value_bits, training, tell)?;
+            (shape, fitted, Some(encoded))
+        }
+    };
     // The prediction is within a few parts in a hundred; a goal is met by what is decoded.
     let mut goal = goal;
     let most = if let tensor::Goal::Rms(rms) = goal { rms } else { f64::INFINITY };
     let mut tries = 0;
     let (encoded, operations, metrics) = loop {
-        let options = tensor::Options { shape, goal, value_bits: args.value_bits.map(|bits| bits[0]), training };
-        let encoded = tensor::encode_fit(&components, &fitted, &coarser, &options)?;
+        let encoded = match first.take() {
+            Some(encoded) => encoded,
+            None => tensor::encode_fit(&components, &fitted, &coarser, &tensor::Options { shape, goal, value_bits, training })?,
+        };
         let (metrics, operations) = verify(data, &encoded.bytes, None, 1, &|done, all| tell("verifying", done, all))?;
         let found = if transfer == Domain::Log { metrics.log_rms } else { metrics.linear_rms };
         if found <= most {
@@ -362,6 +370,10 @@ fn by_tensor(args: &EncodeArgs, data: &Dataset, coarser: &[Dataset], transfer: D
             *rms *= most / found * 0.998;
         }
     };
+    if encoded.is_stiff() {
+        progress.clear();
+        eprintln!("sparse tensor, {transfer:?}: {}", encoded.found());
+    }
     let told = Told {
         method: Method::SparseTensor,
         transfer,

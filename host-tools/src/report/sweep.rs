@@ -54,14 +54,36 @@ struct Visitor<'v> {
     wanted: &'v dyn Fn(&str, u64) -> bool,
     visit: &'v mut dyn FnMut(Made) -> Result<()>,
     say: &'v dyn Fn(&str),
-    /// Whether the system tells the largest memory since the last beginning.
-    knows_peak: &'v Cell<bool>,
+    memory: &'v Memory,
+}
+
+/// Where the largest memory of a method comes from.
+#[derive(Default)]
+struct Memory {
+    /// Whether the system tells the largest since the last beginning.
+    is_known: Cell<bool>,
+    /// The largest of what methods share.
+    shared: Cell<u64>,
+}
+
+impl Memory {
+    /// The largest of what is shared and of the method, bytes.
+    fn peak(&self) -> Option<u64> {
+        peak_memory().filter(|_| self.is_known.get()).map(|own| own.max(self.shared.get()))
+    }
 }
 
 impl Visitor<'_> {
     /// Work begins that the settings of a method share.
     fn begin(&self) {
-        self.knows_peak.set(forget_peak());
+        self.memory.shared.set(0);
+        self.memory.is_known.set(forget_peak());
+    }
+
+    /// What several methods share is made; the work of one of them begins.
+    fn begin_one(&self, shared: Option<u64>) {
+        self.memory.shared.set(shared.unwrap_or(0));
+        self.memory.is_known.set(forget_peak());
     }
 
     /// The budgets that are wanted of a method.
@@ -129,6 +151,7 @@ fn components(data: &Dataset, domain: Domain, rank: usize, budgets: &[u64], visi
     let begun = Instant::now();
     let mut whole = pca(data, domain, rank)?;
     let shared = begun.elapsed().as_secs_f64();
+    let shared_peak = visitor.memory.peak();
 
     for budget in visitor.budgets(&of_pca, budgets) {
         (visitor.say)(&format!("{of_pca} at {budget} bytes"));
@@ -149,6 +172,7 @@ fn components(data: &Dataset, domain: Domain, rank: usize, budgets: &[u64], visi
 
     let wanted = visitor.budgets(&of_tensor, budgets);
     if !wanted.is_empty() {
+        visitor.begin_one(shared_peak);
         (visitor.say)(&format!("{of_tensor}: trial dictionaries"));
         let begun = Instant::now();
         let training = fit::Training::default();
@@ -158,10 +182,7 @@ fn components(data: &Dataset, domain: Domain, rank: usize, budgets: &[u64], visi
             (visitor.say)(&format!("{of_tensor} at {budget} bytes"));
             let begun = Instant::now();
             let goal = tensor::Goal::Size(budget);
-            let shape = trials.choose(1, goal);
-            let options = tensor::Options { shape, goal, value_bits: None, training };
-            let Some(encoded) = kept(tensor::encode(&whole, &[], &options, |_, _, _| ()), &of_tensor, visitor)? else { continue };
-            let trained = &encoded.trained;
+            let Some((shape, _, encoded)) = kept(trials.encode(&[], goal, None, training, |_, _, _| ()), &of_tensor, visitor)? else { continue };
             (visitor.visit)(Made {
                 method: of_tensor.clone(),
                 budget,
@@ -172,16 +193,14 @@ fn components(data: &Dataset, domain: Domain, rank: usize, budgets: &[u64], visi
                     shape.entries,
                     encoded.coefficients as f64 / data.description().texels() as f64
                 ),
-                found: format!(
-                    "{} atoms revived, {} breakdowns, energies of atoms within {:.0}:1, {} coefficients limited",
-                    trained.revived, trained.breakdowns, trained.condition, encoded.limited
-                ),
+                found: encoded.found(),
                 seconds: shared + begun.elapsed().as_secs_f64(),
                 what: What::File(encoded.bytes),
             })?;
         }
     }
 
+    visitor.begin_one(shared_peak);
     for budget in visitor.budgets(&of_clusters, budgets) {
         (visitor.say)(&format!("{of_clusters} at {budget} bytes"));
         let begun = Instant::now();
@@ -214,6 +233,7 @@ fn components(data: &Dataset, domain: Domain, rank: usize, budgets: &[u64], visi
         })?;
     }
 
+    visitor.begin_one(shared_peak);
     let wanted = visitor.budgets(&of_tucker, budgets);
     if let Some(&most) = wanted.iter().max() {
         (visitor.say)(&format!("{of_tucker}: all modes"));
@@ -403,7 +423,7 @@ pub fn measure(request: &Request, path: &Path, adapter: &Adapter, lines: &mut St
     // Names of files and pictures: readable, and of this dataset alone.
     let prefix = format!("{}-{:08x}", slug(&name), short_hash(&identity));
     let all_asked = RefCell::new(Asked::new());
-    let knows_peak = Cell::new(false);
+    let memory = Memory::default();
     let pictured = budgets[budgets.len() / 2];
 
     let known: BTreeSet<String> = lines.lines.iter().map(|line| line.key.clone()).collect();
@@ -423,7 +443,7 @@ pub fn measure(request: &Request, path: &Path, adapter: &Adapter, lines: &mut St
     let bench = Bench::new(&data, &finds, adapter, request.every, &request.out)?;
     let reference = bench.picture(None, &format!("{prefix}-data"))?;
     let mut visit = |made: Made| -> Result<()> {
-        let peak = peak_memory().filter(|_| knows_peak.get());
+        let peak = memory.peak();
         let own = format!("{prefix}-{}-{}", slug(&made.method), made.budget);
         let mut open_seconds = None;
         if let What::File(bytes) = &made.what {
@@ -459,7 +479,7 @@ pub fn measure(request: &Request, path: &Path, adapter: &Adapter, lines: &mut St
         })
     };
     let say_name = |text: &str| say(&format!("{name}: {text}"));
-    everything(&data, request.rank, &budgets, &mut Visitor { wanted: &wanted, visit: &mut visit, say: &say_name, knows_peak: &knows_peak })?;
+    everything(&data, request.rank, &budgets, &mut Visitor { wanted: &wanted, visit: &mut visit, say: &say_name, memory: &memory })?;
     if request.held_out {
         let known: BTreeSet<String> = held.lines.iter().map(|line| line.key.clone()).collect();
         let wanted = |method: &str, budget: u64| is_wanted(&known, method, budget);
@@ -511,7 +531,7 @@ fn hold_out(
         })
     };
     let say = |text: &str| say(&format!("{} lights and {} views held out: {text}", held_lights.len(), held_views.len()));
-    everything(&seen, request.rank, &[budget], &mut Visitor { wanted: &wanted, visit: &mut visit, say: &say, knows_peak: &Cell::new(false) })
+    everything(&seen, request.rank, &[budget], &mut Visitor { wanted: &wanted, visit: &mut visit, say: &say, memory: &Memory::default() })
 }
 
 /// Progress on a terminal, a line each elsewhere.

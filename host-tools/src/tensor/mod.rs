@@ -62,6 +62,19 @@ pub struct Encoded {
     pub trained: Trained,
 }
 
+impl Encoded {
+    /// What training and coding found, in words.
+    pub fn found(&self) -> String {
+        let Trained { revived, breakdowns, condition, .. } = &self.trained;
+        format!("{revived} atoms revived, {breakdowns} breakdowns, energies of atoms within {condition:.0}:1, {} coefficients limited", self.limited)
+    }
+
+    /// Whether any of it is out of the common.
+    pub fn is_stiff(&self) -> bool {
+        self.trained.revived > 0 || self.trained.breakdowns > 0 || self.trained.condition > STIFF || self.limited * 100 > self.coefficients
+    }
+}
+
 /// The transfer and offset that a domain is coded with.
 pub fn transfer_of(data: &Dataset, domain: Domain) -> TransferModel {
     let statistics = data.statistics();
@@ -167,6 +180,14 @@ impl Correlations {
     }
 }
 
+/// ABRDF atoms whose cosine is nearer to one are taken for one; those of common materials are below 0.95.
+const TWINS: f64 = 1e-4;
+/// An error that is more times the estimate than this is not taken for granted.
+const NEAR: f64 = 1.5;
+/// Nor is one of atoms whose energies lie further apart; those of common materials are within ten.
+const STIFF: f64 = 1e3;
+/// Most passes over the data for the ranges of coefficients.
+const MOST_PASSES: usize = 8;
 /// Widths of a value that are tried.
 const VALUE_BITS: std::ops::RangeInclusive<u32> = 5..=9;
 
@@ -177,6 +198,30 @@ const VALUE_BITS: std::ops::RangeInclusive<u32> = 5..=9;
 pub fn encode(pca: &Pca<'_>, coarser: &[&Dataset], options: &Options, tell: impl FnMut(&str, usize, usize)) -> Result<Encoded> {
     let fitted = fit(pca, options.shape, options.training, tell);
     encode_fit(pca, &fitted, coarser, options)
+}
+
+/// Fibres and largest coefficients of the ABRDF atoms, with nothing left of those that are parallel to another one with larger coefficients.
+///
+/// Where one part of the data has nearly all the energy, training makes many atoms of it, which rounding may turn in any order: which of them a
+/// texel is coded with, and how large its coefficient is then, would be chance.
+fn without_twins(light: &Rows, fitted: &Fit) -> (Vec<Vec<(u32, f64)>>, Vec<f64>) {
+    let (mut fibres, mut largest) = (fitted.fibres.clone(), fitted.largest.clone());
+    let products = gram(&Atoms::new(light, &fibres, &largest, 8).rebuild());
+    let n = largest.len();
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by(|&a, &b| largest[b].total_cmp(&largest[a]).then(a.cmp(&b)));
+    let mut kept: Vec<usize> = Vec::with_capacity(n);
+    for atom in order {
+        let is_twin = |&&other: &&usize| products[atom * n + other].abs() > (1.0 - TWINS) * (products[atom * n + atom] * products[other * n + other]).sqrt();
+        match kept.iter().find(is_twin) {
+            Some(&twin) => {
+                largest[twin] += std::mem::take(&mut largest[atom]);
+                fibres.iter_mut().skip(atom).step_by(n).for_each(Vec::clear);
+            }
+            None => kept.push(atom),
+        }
+    }
+    (fibres, largest)
 }
 
 /// Encodes a decomposition that is there.
@@ -212,14 +257,16 @@ pub fn encode_fit(pca: &Pca<'_>, fitted: &Fit, coarser: &[&Dataset], options: &O
 
     let levels: Vec<&Dataset> = std::iter::once(data).chain(coarser.iter().copied()).collect();
     let bits: Vec<u32> = options.value_bits.map_or(VALUE_BITS.collect(), |bits| vec![bits]);
-    let mut largest = fitted.largest.clone();
+    let (fibres, mut largest) = without_twins(&light, fitted);
     let mut best: Option<(f64, Encoded)> = None;
     let mut correlations: Option<(Atoms, Vec<f64>, Vec<Correlations>)> = None;
     for value_bits in bits {
-        // Atoms are made for the range of their coefficients; coded anew these move a little, so it is done twice.
         if correlations.is_none() {
-            for _ in 0..2 {
-                let atoms = Atoms::new(&light, &fitted.fibres, &largest, value_bits.max(8));
+            // Atoms are made for the range of their coefficients; coded anew these move a little, so it is done twice, and where many
+            // are limited, as those of nearly parallel atoms are, again with more room: what errs least is taken.
+            let mut least = f64::INFINITY;
+            for pass in 0..MOST_PASSES {
+                let atoms = Atoms::new(&light, &fibres, &largest, value_bits.max(8));
                 let rebuilt = atoms.rebuild();
                 let products = gram(&rebuilt);
                 let of_levels = levels.iter().map(|level| correlate(level, &forward, &decoded_means, &rebuilt)).collect::<Result<Vec<_>>>()?;
@@ -229,8 +276,15 @@ pub fn encode_fit(pca: &Pca<'_>, fitted: &Fit, coarser: &[&Dataset], options: &O
                 let coefficient = |&(atom, stored): &(u32, u16)| (atom as usize, quantiser.coefficient(atom, stored).abs());
                 lists.model.iter().flatten().map(coefficient).for_each(|(atom, c)| seen[atom] = seen[atom].max(c));
                 // Limited ones say that there is more; a little room for what other numbers of coefficients need.
-                largest = largest.iter().zip(&seen).map(|(&was, &now)| if now >= was * 0.999 { was * 1.25 } else { now.max(was * 1e-6) }).collect();
-                correlations = Some((atoms, products, of_levels));
+                let (room, floor) = if pass == 0 { (1.25, 1e-6) } else { (4.0, 1.0) };
+                largest = largest.iter().zip(&seen).map(|(&was, &now)| if now >= was * 0.999 { was * room } else { now.max(was * floor) }).collect();
+                if lists.error < least * if pass == 1 { 1.01 } else { 1.0 } {
+                    least = lists.error;
+                    correlations = Some((atoms, products, of_levels));
+                }
+                if pass > 0 && lists.limited * 100 <= lists.count {
+                    break;
+                }
             }
         }
         let Some((atoms, products, of_levels)) = &correlations else { continue };
@@ -358,12 +412,15 @@ impl<'a, 'd> Trials<'a, 'd> {
         Trials { pca, trials: SIZES.map(trial).into() }
     }
 
-    /// A shape for a goal, by the estimate of Ruiters and Klein (section 4.2): errors of shorter fibres and lists are read from a decomposition as sums
-    /// of those of both steps.
-    pub fn choose(&self, levels: usize, goal: Goal) -> Shape {
+    /// The best shape of each size of the dictionaries for a goal, the best of all first, and the error that is estimated for it.
+    ///
+    /// By the estimate of Ruiters and Klein (section 4.2): errors of shorter fibres and lists are read from a decomposition as sums of those of both
+    /// steps.
+    fn ranked(&self, levels: usize, goal: Goal) -> Vec<(f64, Shape)> {
         let values = (self.pca.dataset.description().texels() * self.pca.mean.len()) as f64;
-        let mut best: Option<(f64, Shape)> = None;
-        for &Trial { light_atoms, abrdf_atoms, ref of_texels, ref of_fibres } in &self.trials {
+        let best_of = |trial: &Trial| {
+            let &Trial { light_atoms, abrdf_atoms, ref of_texels, ref of_fibres } = trial;
+            let mut best: Option<(f64, f64, Shape)> = None;
             for (entries, of_fibres) in of_fibres.iter().enumerate().skip(2) {
                 for (coefficients, of_texels) in of_texels.iter().enumerate().skip(2) {
                     let shape = Shape { light_atoms, abrdf_atoms, entries, coefficients };
@@ -377,18 +434,66 @@ impl<'a, 'd> Trials<'a, 'd> {
                         Goal::Rms(_) => bytes as f64,
                         Goal::All => error * (bytes as f64).sqrt(),
                     };
-                    if best.is_none_or(|(least, _)| worth < least) {
-                        best = Some((worth, shape));
+                    if best.is_none_or(|(least, ..)| worth < least) {
+                        best = Some((worth, error, shape));
                     }
                 }
             }
-        }
-        let Some((_, shape)) = best else { return Shape { light_atoms: 64, abrdf_atoms: 128, entries: 8, coefficients: 10 } };
+            best
+        };
+        let mut all: Vec<(f64, f64, Shape)> = self.trials.iter().filter_map(best_of).collect();
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
         // The estimate is rough: a little more room, of which the goal takes what it needs. Lists can be shortened to a size, fibres cannot.
-        let longer = Shape { entries: shape.entries + 1, ..shape };
-        let fits = |size| estimated_bytes(self.pca.dataset, levels, longer) <= size;
-        let entries = if matches!(goal, Goal::Size(size) if !fits(size)) { shape.entries } else { longer.entries };
-        Shape { entries, coefficients: shape.coefficients + 3, ..shape }
+        let roomy = |(_, error, shape): (f64, f64, Shape)| {
+            let longer = Shape { entries: shape.entries + 1, ..shape };
+            let fits = |size| estimated_bytes(self.pca.dataset, levels, longer) <= size;
+            let entries = if matches!(goal, Goal::Size(size) if !fits(size)) { shape.entries } else { longer.entries };
+            (error, Shape { entries, coefficients: shape.coefficients + 3, ..shape })
+        };
+        if all.is_empty() {
+            return vec![(f64::INFINITY, Shape { light_atoms: 64, abrdf_atoms: 128, entries: 8, coefficients: 10 })];
+        }
+        all.into_iter().map(roomy).collect()
+    }
+
+    /// Encodes with the shape that is estimated to be best, and with those of other sizes of the dictionaries where the error comes out far from the
+    /// estimate or the goal is not reached, as it may with data whose energy is in a few of their values. Gives the decomposition too.
+    ///
+    /// # Errors
+    /// If the data cannot be read, or no shape reaches the goal.
+    pub fn encode(
+        &self,
+        coarser: &[&Dataset],
+        goal: Goal,
+        value_bits: Option<u32>,
+        training: Training,
+        mut tell: impl FnMut(&str, usize, usize),
+    ) -> Result<(Shape, Fit, Encoded)> {
+        let mut best: Option<(Shape, Fit, Encoded)> = None;
+        let mut failed = None;
+        for (estimate, shape) in self.ranked(1 + coarser.len(), goal) {
+            let fitted = fit(self.pca, shape, training, &mut tell);
+            let encoded = match encode_fit(self.pca, &fitted, coarser, &Options { shape, goal, value_bits, training }) {
+                Ok(encoded) => encoded,
+                Err(error @ ToolError::Usage(_)) => {
+                    failed.get_or_insert(error);
+                    continue;
+                }
+                Err(error) => return Err(error),
+            };
+            let is_near = matches!(goal, Goal::Rms(_)) || encoded.predicted_rms <= NEAR * estimate && encoded.trained.condition <= STIFF;
+            let worth = |encoded: &Encoded| match goal {
+                Goal::Rms(_) => encoded.bytes.len() as f64,
+                Goal::Size(_) | Goal::All => encoded.predicted_rms,
+            };
+            if best.as_ref().is_none_or(|(.., least)| worth(&encoded) < worth(least)) {
+                best = Some((shape, fitted, encoded));
+            }
+            if is_near {
+                break;
+            }
+        }
+        best.ok_or_else(|| failed.unwrap_or_else(|| ToolError::Usage("no shape of a sparse tensor was tried".into())))
     }
 }
 

@@ -26,7 +26,7 @@ pub struct Advice {
 
 /// All of them. Offsets: the first atom, dictionary or direction it is about, else the section; found: how many, or as said.
 pub const ADVICE: [Advice; 6] = [
-    Advice { id: "W1", name: "UnusedAtoms", expected: "every atom is in a record", hint: "selvedge trim removes them; found is their number" },
+    Advice { id: "W1", name: "UnusedAtoms", expected: "every atom is in a record or list", hint: "selvedge trim removes them; found is their number" },
     Advice { id: "W2", name: "UnusedDictionaries", expected: "every own dictionary is in a record", hint: "selvedge trim removes them; found is their number" },
     Advice {
         id: "W3",
