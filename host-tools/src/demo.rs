@@ -7,7 +7,7 @@ use crate::picture::{Picture, false_colour};
 use crate::show::{decode_picture, render_ball};
 use crate::sparsebtf::{AuthorsMaterial, read_material};
 use crate::{files, inspect, story, validate, write};
-use selvedge::{Direction, Limits, Rgb, Selvedge};
+use selvedge::{Direction, Limits, Selvedge};
 use std::f64::consts::LN_2;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -124,7 +124,7 @@ fn compare_with_gpu(materials: &[Selvedge<'_>], say: &mut dyn FnMut(String)) -> 
             |i: usize| selvedge::interpolation::texel_values(material.words(), material.material(), i as u32 % size[0], i as u32 / size[0], taps.0, taps.1);
         let answer = |(i, rgb): (usize, &[f32; 3])| {
             let [r, g, b] = rgb.map(f32::to_bits);
-            Answer::new(Rgb { r, g, b }, values(i))
+            Answer::new(selvedge::Rgb { r, g, b }, values(i))
         };
         let cpu: Vec<Answer> = picture.pixels.iter().enumerate().map(answer).collect();
         compare(&on_gpu, &cpu);
