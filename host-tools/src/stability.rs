@@ -105,6 +105,7 @@ fn all() -> Vec<Case> {
     cases.extend(linear_algebra());
     cases.extend(pursuit());
     cases.extend(materials());
+    cases.push(no_numbers());
     cases
 }
 
@@ -748,6 +749,22 @@ fn encoded(data: &Dataset, method: Method, domain: Domain) -> Result<(Vec<u8>, f
     Ok((made.bytes, made.predicted_rms * (blocks as f64 / (width * height) as f64).sqrt()))
 }
 
+/// What is no radiance is refused before anything is computed from it.
+fn no_numbers() -> Case {
+    const BAD: [f32; 4] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1e-30];
+    case(
+        "materials",
+        "values that are no radiances: no number, infinities, a negative one",
+        "values that are tried",
+        "none is taken: the first check of every value that is written to a dataset",
+        |folder| {
+            let set = directions::grid(81).expect("known");
+            let taken = |&bad: &f32| dataset(folder, [3, 2], &set[..4], &set[..5], |t, l, _, c| if t == 4 && l == 1 && c == 2 { bad } else { 0.5 }).is_ok();
+            Ok(Outcome { condition: BAD.len() as f64, bound: 0.0, measured: BAD.iter().filter(|bad| taken(bad)).count() as f64 })
+        },
+    )
+}
+
 /// What a value of a material is, by texel, light, view and colour.
 type Value = fn(usize, usize, usize, usize) -> f32;
 
@@ -756,7 +773,7 @@ fn smooth(t: usize, l: usize, v: usize, c: usize) -> f32 {
 }
 
 /// Name, texels, lights, views and values.
-const MATERIALS: [(&str, [usize; 2], usize, usize, Value); 14] = [
+const MATERIALS: [(&str, [usize; 2], usize, usize, Value); 15] = [
     ("a highlight 1e3 times the rest", [12, 9], 9, 7, |t, l, v, c| if l == v && t % 3 == 0 { 200.0 } else { smooth(t, l, v, c) }),
     ("a highlight 1e4 times the rest", [12, 9], 9, 7, |t, l, v, c| if l == v && t % 3 == 0 { 2000.0 } else { smooth(t, l, v, c) }),
     ("a highlight 1e6 times the rest", [12, 9], 9, 7, |t, l, v, c| if l == v && t % 3 == 0 { 600.0 } else { smooth(t, l, v, c) * 0.003 }),
@@ -765,6 +782,7 @@ const MATERIALS: [(&str, [usize; 2], usize, usize, Value); 14] = [
     ("all black", [12, 9], 9, 7, |_, _, _, _| 0.0),
     ("constant", [12, 9], 9, 7, |_, _, _, _| 0.75),
     ("rank one", [12, 9], 9, 7, |t, l, v, c| (1.0 + t as f32 * 0.1) * (0.2 + ((l + 2 * v + c) % 11) as f32 * 0.05)),
+    ("one image without variance", [12, 9], 9, 7, |t, l, v, c| if l == 3 && v == 2 { 0.4 } else { smooth(t, l, v, c) }),
     ("one texel", [1, 1], 9, 7, smooth),
     ("one light and one view", [12, 9], 1, 1, smooth),
     ("one number", [1, 1], 1, 1, |_, _, _, _| 0.25),

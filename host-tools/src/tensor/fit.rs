@@ -121,8 +121,9 @@ fn uses(codes: &[Code], atoms: usize) -> Vec<f64> {
     energy.iter().map(|e| e.sqrt()).collect()
 }
 
-/// The atoms that with given codes come nearest to the samples: one solution of the normal equations for all of them.
-fn solve_atoms(samples: &Rows, codes: &[Code], atoms: usize) -> Rows {
+/// The atoms that with given codes come nearest to the samples: one solution of the normal equations for all of them. Nothing if the equations are
+/// singular in the numbers that they are solved in.
+fn solve_atoms(samples: &Rows, codes: &[Code], atoms: usize) -> Option<Rows> {
     let dim = samples.dim;
     let mut normal = vec![0.0f64; atoms * atoms];
     let mut right = vec![0.0f64; atoms * dim];
@@ -135,9 +136,8 @@ fn solve_atoms(samples: &Rows, codes: &[Code], atoms: usize) -> Rows {
     // A millionth of the mean use: what is hardly used stays near zero instead of growing without bound.
     let ridge = (0..atoms).map(|a| normal[a * atoms + a]).sum::<f64>() / atoms as f64 * 1e-6 + f64::MIN_POSITIVE;
     let matrix = |a: usize, b: usize| normal[a * atoms + b] + if a == b { ridge } else { 0.0 };
-    let solved = solve_symmetric(matrix, &right, atoms);
-    let value = |i: usize| solved.as_ref().map_or(right[i], |solved| solved[(i / dim, i % dim)]);
-    Rows { dim, values: (0..atoms * dim).map(|i| value(i) as f32).collect() }
+    let solved = solve_symmetric(matrix, &right, atoms)?;
+    Some(Rows { dim, values: (0..atoms * dim).map(|i| solved[(i / dim, i % dim)] as f32).collect() })
 }
 
 /// Decomposes the components of a dataset.
@@ -180,12 +180,17 @@ pub fn fit(pca: &Pca<'_>, shape: Shape, training: Training, mut tell: impl FnMut
             let rebuilt = rebuild(&light, &unweighted, shape.abrdf_atoms);
             let inside = project(&rebuilt, &pca.of_pairs, rank);
             codes = code_with(&samples, &inside, &gram(&rebuilt), pursuit);
-            atoms = solve_atoms(&samples, &codes, shape.abrdf_atoms);
+            match solve_atoms(&samples, &codes, shape.abrdf_atoms) {
+                Some(better) => atoms = better,
+                // They stay as they are.
+                None => trained.breakdowns += 1,
+            }
             // Unit length, as K-SVD has them; the codes take what they had.
             let lengths: Vec<f64> = (0..shape.abrdf_atoms).map(|a| normalise(atoms.row_mut(a))).collect();
             codes.iter_mut().flat_map(|code| &mut code.terms).for_each(|(atom, value)| *value *= lengths[*atom as usize]);
         }
     }
+    trained.breakdowns += codes.iter().chain(&fibre_codes).map(|code| code.breakdowns as u64).sum::<u64>();
     let fibres = unweigh(&fibre_codes, &weights);
     let mut largest = vec![0.0f64; shape.abrdf_atoms];
     codes.iter().flat_map(|code| &code.terms).for_each(|&(atom, value)| largest[atom as usize] = largest[atom as usize].max(value.abs()));
