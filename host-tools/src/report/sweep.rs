@@ -76,11 +76,10 @@ impl Memory {
 impl Visitor<'_> {
     /// Work begins that the settings of a method share.
     fn begin(&self) {
-        self.memory.shared.set(0);
-        self.memory.is_known.set(forget_peak());
+        self.begin_one(None);
     }
 
-    /// What several methods share is made; the work of one of them begins.
+    /// The work of a method begins that shares with others what is made; the largest memory of that.
     fn begin_one(&self, shared: Option<u64>) {
         self.memory.shared.set(shared.unwrap_or(0));
         self.memory.is_known.set(forget_peak());

@@ -33,6 +33,23 @@ pub enum Goal {
     All,
 }
 
+impl Goal {
+    /// What a file is worth that reaches the goal; the least is the best.
+    fn worth(self, rms: f64, bytes: f64) -> f64 {
+        match self {
+            Goal::Rms(_) => bytes,
+            Goal::Size(_) => rms,
+            // Bytes to the power at which error falls with them, about: no goal says what either is worth.
+            Goal::All => rms * bytes.sqrt(),
+        }
+    }
+}
+
+/// Whether so many coefficients are limited that ranges do not fit.
+fn are_many(limited: usize, coefficients: usize) -> bool {
+    limited * 100 > coefficients
+}
+
 /// How to encode.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
@@ -71,7 +88,7 @@ impl Encoded {
 
     /// Whether any of it is out of the common.
     pub fn is_stiff(&self) -> bool {
-        self.trained.revived > 0 || self.trained.breakdowns > 0 || self.trained.condition > STIFF || self.limited * 100 > self.coefficients
+        self.trained.revived > 0 || self.trained.breakdowns > 0 || self.trained.condition > STIFF || are_many(self.limited, self.coefficients)
     }
 }
 
@@ -282,7 +299,7 @@ pub fn encode_fit(pca: &Pca<'_>, fitted: &Fit, coarser: &[&Dataset], options: &O
                     least = lists.error;
                     correlations = Some((atoms, products, of_levels));
                 }
-                if pass > 0 && lists.limited * 100 <= lists.count {
+                if pass > 0 && !are_many(lists.limited, lists.count) {
                     break;
                 }
             }
@@ -351,12 +368,7 @@ pub fn encode_fit(pca: &Pca<'_>, fitted: &Fit, coarser: &[&Dataset], options: &O
         }
         let (model, bytes, lists) = found;
         let predicted_rms = (lists.error / values).sqrt() * unit;
-        let worth = match options.goal {
-            Goal::Rms(_) => bytes.len() as f64,
-            Goal::Size(_) => predicted_rms,
-            // Bytes to the power at which error falls with them, about: no goal says what either is worth.
-            Goal::All => predicted_rms * (bytes.len() as f64).sqrt(),
-        };
+        let worth = options.goal.worth(predicted_rms, bytes.len() as f64);
         let encoded = Encoded { model, bytes, coefficients: lists.count, predicted_rms, limited: lists.limited, trained: fitted.trained };
         if best.as_ref().is_none_or(|(least, _)| worth < *least) {
             best = Some((worth, encoded));
@@ -429,10 +441,8 @@ impl<'a, 'd> Trials<'a, 'd> {
                     // What misses the goal is worse than all that meet it, by how far it misses.
                     let worth = match goal {
                         Goal::Size(size) if bytes > size => 1e30 * bytes as f64,
-                        Goal::Size(_) => error,
                         Goal::Rms(rms) if error > rms => 1e30 * error,
-                        Goal::Rms(_) => bytes as f64,
-                        Goal::All => error * (bytes as f64).sqrt(),
+                        _ => goal.worth(error, bytes as f64),
                     };
                     if best.is_none_or(|(least, ..)| worth < least) {
                         best = Some((worth, error, shape));
@@ -482,10 +492,7 @@ impl<'a, 'd> Trials<'a, 'd> {
                 Err(error) => return Err(error),
             };
             let is_near = matches!(goal, Goal::Rms(_)) || encoded.predicted_rms <= NEAR * estimate && encoded.trained.condition <= STIFF;
-            let worth = |encoded: &Encoded| match goal {
-                Goal::Rms(_) => encoded.bytes.len() as f64,
-                Goal::Size(_) | Goal::All => encoded.predicted_rms,
-            };
+            let worth = |encoded: &Encoded| goal.worth(encoded.predicted_rms, encoded.bytes.len() as f64);
             if best.as_ref().is_none_or(|(.., least)| worth(&encoded) < worth(least)) {
                 best = Some((shape, fitted, encoded));
             }
