@@ -9,20 +9,46 @@ fn main() {
     let manifest = std::fs::read_to_string(suite.join("manifest.tsv")).expect("the suite's manifest");
     println!("cargo:rerun-if-changed={}", suite.display());
     let bytes = |file: &str| format!("include_bytes!({:?})", suite.join(file));
-    let optional = |file: &str| if file == "-" { "None".to_owned() } else { format!("Some({})", bytes(file)) };
+    let optional =
+        |file: &str| if file == "-" { "None".to_owned() } else { format!("Some({})", bytes(file)) };
     let mut table = String::from("&[\n");
     for line in manifest.lines().filter(|line| !line.starts_with('#') && !line.is_empty()) {
         let columns: Vec<&str> = line.split('\t').collect();
         let (limits, answer) = if columns[0] == "valid" {
             let digest = columns[3];
-            let octets = (0..digest.len() / 2).map(|i| format!("0x{}", &digest[2 * i..2 * i + 2])).collect::<Vec<_>>().join(", ");
-            ("None".to_owned(), if digest == "-" { "Answer::Legal".to_owned() } else { format!("Answer::Digest([{octets}])") })
+            let octets = (0..digest.len() / 2)
+                .map(|i| format!("0x{}", &digest[2 * i..2 * i + 2]))
+                .collect::<Vec<_>>()
+                .join(", ");
+            (
+                "None".to_owned(),
+                if digest == "-" {
+                    "Answer::Legal".to_owned()
+                } else {
+                    format!("Answer::Digest([{octets}])")
+                },
+            )
         } else {
-            let limits = if columns[3] == "-" { "None".to_owned() } else { format!("Some([{}])", columns[3]) };
-            (limits, format!("Answer::Broken({:?}, {}, {}, {})", columns[4], columns[5] == "dictionary", columns[6], columns[7]))
+            let limits =
+                if columns[3] == "-" { "None".to_owned() } else { format!("Some([{}])", columns[3]) };
+            (
+                limits,
+                format!(
+                    "Answer::Broken({:?}, {}, {}, {})",
+                    columns[4],
+                    columns[5] == "dictionary",
+                    columns[6],
+                    columns[7]
+                ),
+            )
         };
-        writeln!(table, "    Vector {{ file: {}, dictionary: {}, limits: {limits}, answer: {answer} }},", bytes(columns[1]), optional(columns[2]))
-            .expect("text");
+        writeln!(
+            table,
+            "    Vector {{ file: {}, dictionary: {}, limits: {limits}, answer: {answer} }},",
+            bytes(columns[1]),
+            optional(columns[2])
+        )
+        .expect("text");
     }
     table.push_str("]\n");
     let out = std::env::var("OUT_DIR").expect("set by cargo");

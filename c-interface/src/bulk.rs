@@ -2,7 +2,8 @@
 
 use crate::lent::{Checked, Lent, Place, check, read, read_material, status, write};
 use crate::types::{
-    SELVEDGE_BATCH_LIMIT, SELVEDGE_TOO_LONG, SELVEDGE_TOO_SHORT, selvedge_direction, selvedge_material, selvedge_query, selvedge_rgb, selvedge_status,
+    SELVEDGE_BATCH_LIMIT, SELVEDGE_TOO_LONG, SELVEDGE_TOO_SHORT, selvedge_direction, selvedge_material,
+    selvedge_query, selvedge_rgb, selvedge_status,
 };
 use selvedge::{FilteredQuery, Selvedge};
 
@@ -11,7 +12,12 @@ use selvedge::{FilteredQuery, Selvedge};
 /// # Safety
 /// As the header says of pointers and of materials.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn selvedge_image_size(material: *const selvedge_material, level: u32, out_width: *mut u32, out_height: *mut u32) -> selvedge_status {
+pub unsafe extern "C" fn selvedge_image_size(
+    material: *const selvedge_material,
+    level: u32,
+    out_width: *mut u32,
+    out_height: *mut u32,
+) -> selvedge_status {
     let size = || {
         // SAFETY: the caller's promise is that of `read_material`.
         let [width, height] = unsafe { read_material(material) }?.image_size(level);
@@ -30,18 +36,27 @@ pub unsafe extern "C" fn selvedge_image_size(material: *const selvedge_material,
 /// # Safety
 /// As the header says of pointers and of materials.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn selvedge_image_scratch_length(material: *const selvedge_material, out: *mut usize) -> selvedge_status {
+pub unsafe extern "C" fn selvedge_image_scratch_length(
+    material: *const selvedge_material,
+    out: *mut usize,
+) -> selvedge_status {
     // SAFETY: the caller's promise is that of `read_material`.
     let length = unsafe { read_material(material) }.map(|selvedge| selvedge.image_scratch_len());
     // SAFETY: the caller's promise is that of `write`.
     status(length.and_then(|length| unsafe { write(out, length) }))
 }
 
-/// Two lent buffers, filled with zeros, each apart from the other, from both files and from what else the call names.
+/// Two lent buffers, filled with zeros, each apart from the other, from both files and from what else the
+/// call names.
 ///
 /// # Safety
 /// Both are there, and nobody else uses them during `'a`.
-unsafe fn buffers<'a, T: Copy>(selvedge: &Selvedge<'_>, scratch: Lent<i32>, out: Lent<T>, others: &[Place]) -> Checked<(&'a mut [i32], &'a mut [T])> {
+unsafe fn buffers<'a, T: Copy>(
+    selvedge: &Selvedge<'_>,
+    scratch: Lent<i32>,
+    out: Lent<T>,
+    others: &[Place],
+) -> Checked<(&'a mut [i32], &'a mut [T])> {
     let words = selvedge.words();
     let files = [Place::of(words.file), Place::of(words.dictionary)];
     for place in [scratch.place(), out.place()] {
@@ -66,7 +81,12 @@ unsafe fn image<T: Copy>(
     directions: [*const selvedge_direction; 2],
     (scratch, scratch_length): (*mut i32, usize),
     (out, out_length): (*mut T, usize),
-    decode: impl FnOnce(&Selvedge<'_>, [selvedge_direction; 2], &mut [i32], &mut [T]) -> Result<(), selvedge::BufferTooSmall>,
+    decode: impl FnOnce(
+        &Selvedge<'_>,
+        [selvedge_direction; 2],
+        &mut [i32],
+        &mut [T],
+    ) -> Result<(), selvedge::BufferTooSmall>,
 ) -> selvedge_status {
     let image = || {
         // SAFETY: the caller's promise.
@@ -104,7 +124,9 @@ pub unsafe extern "C" fn selvedge_decode_image(
     out: *mut selvedge_rgb,
     out_length: usize,
 ) -> selvedge_status {
-    let decode = |selvedge: &Selvedge<'_>, [light, view]: [_; 2], scratch: &mut [_], out: &mut [_]| selvedge.decode_image(level, light, view, scratch, out);
+    let decode = |selvedge: &Selvedge<'_>, [light, view]: [_; 2], scratch: &mut [_], out: &mut [_]| {
+        selvedge.decode_image(level, light, view, scratch, out)
+    };
     // SAFETY: the caller's promise is that of `image`.
     unsafe { image(material, level, [light, view], (scratch, scratch_length), (out, out_length), decode) }
 }
@@ -127,8 +149,9 @@ pub unsafe extern "C" fn selvedge_decode_channel(
 ) -> selvedge_status {
     // Before it becomes an index, so that no narrow machine makes another channel of it.
     let channel = channel.min(2) as usize;
-    let decode =
-        |selvedge: &Selvedge<'_>, [light, view]: [_; 2], scratch: &mut [_], out: &mut [_]| selvedge.decode_channel(channel, level, light, view, scratch, out);
+    let decode = |selvedge: &Selvedge<'_>, [light, view]: [_; 2], scratch: &mut [_], out: &mut [_]| {
+        selvedge.decode_channel(channel, level, light, view, scratch, out)
+    };
     // SAFETY: the caller's promise is that of `image`.
     unsafe { image(material, level, [light, view], (scratch, scratch_length), (out, out_length), decode) }
 }
@@ -138,7 +161,11 @@ pub unsafe extern "C" fn selvedge_decode_channel(
 /// # Safety
 /// As the header says of pointers and of materials.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn selvedge_batch_scratch_length(material: *const selvedge_material, count: usize, out: *mut usize) -> selvedge_status {
+pub unsafe extern "C" fn selvedge_batch_scratch_length(
+    material: *const selvedge_material,
+    count: usize,
+    out: *mut usize,
+) -> selvedge_status {
     let length = || {
         // SAFETY: the caller's promise is that of `read_material`.
         let selvedge = unsafe { read_material(material) }?;
@@ -176,7 +203,8 @@ pub unsafe extern "C" fn selvedge_sample_batch(
         let scratch = Lent::to_write(scratch, scratch_length, selvedge.batch_scratch_len(count))?;
         let out = Lent::to_write(out, out_length, count)?;
         // SAFETY: the caller's promise.
-        let (scratch, out) = unsafe { buffers(&selvedge, scratch, out, &[Place::of_one(material), queries.place()]) }?;
+        let (scratch, out) =
+            unsafe { buffers(&selvedge, scratch, out, &[Place::of_one(material), queries.place()]) }?;
         // SAFETY: the caller's promise; `buffers` has checked that nothing written overlaps them.
         let queries = unsafe { queries.as_slice() };
         selvedge.sample_batch(queries, scratch, out).map_err(|_| SELVEDGE_TOO_SHORT)
@@ -189,7 +217,12 @@ pub unsafe extern "C" fn selvedge_sample_batch(
 /// # Safety
 /// As the header says of pointers.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn selvedge_to_floats(texels: *const selvedge_rgb, count: usize, out: *mut f32, out_length: usize) -> selvedge_status {
+pub unsafe extern "C" fn selvedge_to_floats(
+    texels: *const selvedge_rgb,
+    count: usize,
+    out: *mut f32,
+    out_length: usize,
+) -> selvedge_status {
     let copy = || {
         let texels = Lent::to_read(texels, count)?;
         let floats = count.checked_mul(3).ok_or(SELVEDGE_TOO_LONG)?;

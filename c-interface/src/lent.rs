@@ -1,15 +1,15 @@
 //! Memory that callers lend: the only place that follows pointers.
 //!
-//! What can be seen is checked: NULL, alignment, lengths beyond the address space, overlap, materials that were
-//! never opened. What cannot be seen is the caller's promise, spelled out in the header: that memory is
+//! What can be seen is checked: NULL, alignment, lengths beyond the address space, overlap, materials that
+//! were never opened. What cannot be seen is the caller's promise, spelled out in the header: that memory is
 //! there for the stated length, and that the file's bytes outlive the material and do not change.
 //!
 //! Slices of integers are made only of memory that is initialised: what the caller lends for writing is
 //! filled with zeros first, so no result can depend on what it held.
 
 use crate::types::{
-    SELVEDGE_ABI_VERSION, SELVEDGE_MISALIGNED, SELVEDGE_NOT_OPEN, SELVEDGE_NULL_POINTER, SELVEDGE_OK, SELVEDGE_OVERLAP, SELVEDGE_TOO_LONG, SELVEDGE_TOO_SHORT,
-    selvedge_material, selvedge_status,
+    SELVEDGE_ABI_VERSION, SELVEDGE_MISALIGNED, SELVEDGE_NOT_OPEN, SELVEDGE_NULL_POINTER, SELVEDGE_OK,
+    SELVEDGE_OVERLAP, SELVEDGE_TOO_LONG, SELVEDGE_TOO_SHORT, selvedge_material, selvedge_status,
 };
 use core::mem::MaybeUninit;
 use selvedge::Selvedge;
@@ -22,7 +22,8 @@ pub(crate) fn status(result: Checked<()>) -> selvedge_status {
     result.err().unwrap_or(SELVEDGE_OK)
 }
 
-/// What a [`selvedge_material`] holds. The seals tell it from memory that nobody opened, or that was copied in part.
+/// What a [`selvedge_material`] holds. The seals tell it from memory that nobody opened, or that was copied
+/// in part.
 #[repr(C)]
 struct Sealed<'a> {
     front: u64,
@@ -34,8 +35,14 @@ struct Sealed<'a> {
 const FRONT: u64 = u64::from_le_bytes(*b"selvedge").rotate_left(7) ^ SELVEDGE_ABI_VERSION as u64;
 const BACK: u64 = !FRONT.rotate_left(32);
 
-const _: () = assert!(size_of::<Sealed<'static>>() <= size_of::<selvedge_material>(), "a sealed material fits the caller's words");
-const _: () = assert!(align_of::<Sealed<'static>>() <= align_of::<selvedge_material>(), "a sealed material lies well in them");
+const _: () = assert!(
+    size_of::<Sealed<'static>>() <= size_of::<selvedge_material>(),
+    "a sealed material fits the caller's words"
+);
+const _: () = assert!(
+    align_of::<Sealed<'static>>() <= align_of::<selvedge_material>(),
+    "a sealed material lies well in them"
+);
 
 /// Many threads may sample one material, since it is only read.
 const fn is_shareable<T: Send + Sync + Copy>() {}
@@ -65,10 +72,12 @@ pub(crate) unsafe fn read<T: Copy>(pointer: *const T) -> Checked<T> {
 /// Puts a value where a pointer says.
 ///
 /// # Safety
-/// A pointer that is neither NULL nor misaligned points to memory of a `T` that nobody else uses during the call.
+/// A pointer that is neither NULL nor misaligned points to memory of a `T` that nobody else uses during the
+/// call.
 pub(crate) unsafe fn write<T>(pointer: *mut T, value: T) -> Checked<()> {
     check(pointer)?;
-    // SAFETY: not NULL and aligned; the rest is the caller's promise. What was there needs no drop: it is plain data.
+    // SAFETY: not NULL and aligned; the rest is the caller's promise. What was there needs no drop: it is
+    // plain data.
     unsafe { pointer.write(value) };
     Ok(())
 }
@@ -81,7 +90,8 @@ pub(crate) struct Lent<T> {
 }
 
 impl<T: Copy> Lent<T> {
-    /// `count` elements to be read from `pointer` on. NULL is the pointer of no elements, and of nothing else.
+    /// `count` elements to be read from `pointer` on. NULL is the pointer of no elements, and of nothing
+    /// else.
     pub fn to_read(pointer: *const T, count: usize) -> Checked<Lent<T>> {
         Lent::new(pointer.cast_mut(), count)
     }
@@ -107,7 +117,10 @@ impl<T: Copy> Lent<T> {
     /// The addresses.
     pub fn place(self) -> Place {
         // Does not overflow: that was checked when it was made.
-        Place { start: self.pointer.addr(), end: self.pointer.addr().wrapping_add(self.count.wrapping_mul(size_of::<T>())) }
+        Place {
+            start: self.pointer.addr(),
+            end: self.pointer.addr().wrapping_add(self.count.wrapping_mul(size_of::<T>())),
+        }
     }
 
     /// The elements.
@@ -115,7 +128,8 @@ impl<T: Copy> Lent<T> {
     /// # Safety
     /// They are there and initialised, and nobody writes them during `'a`.
     pub unsafe fn as_slice<'a>(self) -> &'a [T] {
-        // SAFETY: not NULL, aligned and of a length that a slice may have, by construction; the rest is the caller's promise.
+        // SAFETY: not NULL, aligned and of a length that a slice may have, by construction; the rest is the
+        // caller's promise.
         unsafe { core::slice::from_raw_parts(self.pointer, self.count) }
     }
 
@@ -132,12 +146,13 @@ impl<T: Copy> Lent<T> {
     /// The elements, filled with zeros.
     ///
     /// # Safety
-    /// They are there, nobody else uses them during `'a`, no other slice of this call overlaps them, and zero is a value of `T`.
+    /// They are there, nobody else uses them during `'a`, no other slice of this call overlaps them, and zero
+    /// is a value of `T`.
     pub unsafe fn as_zeroed_slice<'a>(self) -> &'a mut [T] {
         // SAFETY: as below.
         unsafe { self.pointer.write_bytes(0, self.count) };
-        // SAFETY: initialised by the line above; not NULL, aligned and of a length that a slice may have, by construction;
-        // the rest is the caller's promise.
+        // SAFETY: initialised by the line above; not NULL, aligned and of a length that a slice may have, by
+        // construction; the rest is the caller's promise.
         unsafe { core::slice::from_raw_parts_mut(self.pointer, self.count) }
     }
 }
@@ -150,7 +165,8 @@ pub(crate) struct Place {
 }
 
 impl Place {
-    /// Where lent bytes lie, before anything is known of them. Nothing lies at NULL, whatever its length says.
+    /// Where lent bytes lie, before anything is known of them. Nothing lies at NULL, whatever its length
+    /// says.
     pub fn of_bytes(pointer: *const u8, length: usize) -> Place {
         let length = if pointer.is_null() { 0 } else { length };
         Place { start: pointer.addr(), end: pointer.addr().saturating_add(length) }
@@ -189,7 +205,8 @@ impl Place {
 pub(crate) unsafe fn read_material<'a>(pointer: *const selvedge_material) -> Checked<Selvedge<'a>> {
     check(pointer)?;
     let sealed: *const Sealed<'a> = pointer.cast();
-    // SAFETY: the assertions above say that the field lies in the caller's words, aligned. Any bits are a number.
+    // SAFETY: the assertions above say that the field lies in the caller's words, aligned. Any bits are a
+    // number.
     let front = unsafe { (*sealed).front };
     // SAFETY: the same.
     let back = unsafe { (*sealed).back };

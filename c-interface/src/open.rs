@@ -1,10 +1,13 @@
 //! Opening and validating, what a finding means, and what an open material says of itself.
 
-use crate::lent::{Checked, Lent, Place, check, close_material, read, read_material, status, write, write_material};
+use crate::lent::{
+    Checked, Lent, Place, check, close_material, read, read_material, status, write, write_material,
+};
 use crate::types::{
-    SELVEDGE_ABI_VERSION, SELVEDGE_INVALID, SELVEDGE_LIMITS, SELVEDGE_MISALIGNED, SELVEDGE_NO_RULE, SELVEDGE_NOT_OPEN, SELVEDGE_NULL_POINTER, SELVEDGE_OK,
-    SELVEDGE_OVERLAP, SELVEDGE_TOO_LONG, SELVEDGE_TOO_SHORT, SELVEDGE_UNSUPPORTED, SELVEDGE_USAGE, selvedge_finding, selvedge_header, selvedge_limits,
-    selvedge_material, selvedge_metadata, selvedge_report, selvedge_status, status_of,
+    SELVEDGE_ABI_VERSION, SELVEDGE_INVALID, SELVEDGE_LIMITS, SELVEDGE_MISALIGNED, SELVEDGE_NO_RULE,
+    SELVEDGE_NOT_OPEN, SELVEDGE_NULL_POINTER, SELVEDGE_OK, SELVEDGE_OVERLAP, SELVEDGE_TOO_LONG,
+    SELVEDGE_TOO_SHORT, SELVEDGE_UNSUPPORTED, SELVEDGE_USAGE, selvedge_finding, selvedge_header,
+    selvedge_limits, selvedge_material, selvedge_metadata, selvedge_report, selvedge_status, status_of,
 };
 use core::ffi::{c_char, c_void};
 use selvedge::{Finding, Limits, Rule};
@@ -66,7 +69,8 @@ struct Lending<'a> {
 }
 
 /// # Safety
-/// Pointers with lengths name memory that is initialised and stays as it is during `'a`; `limits` is as in `read`.
+/// Pointers with lengths name memory that is initialised and stays as it is during `'a`; `limits` is as in
+/// `read`.
 unsafe fn lending<'a>(
     bytes: *const u8,
     length: usize,
@@ -92,8 +96,8 @@ unsafe fn lending<'a>(
 /// Opens a material: [`selvedge::open_with`].
 ///
 /// # Safety
-/// As the header says: pointers are NULL where that is allowed or name memory of the stated length, and the bytes
-/// of both files stay where and as they are for as long as the material or a copy of it is used.
+/// As the header says: pointers are NULL where that is allowed or name memory of the stated length, and the
+/// bytes of both files stay where and as they are for as long as the material or a copy of it is used.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn selvedge_open(
     bytes: *const u8,
@@ -107,7 +111,11 @@ pub unsafe extern "C" fn selvedge_open(
     let open = || {
         check(out_material)?;
         // Before anything is written, since all of these are read afterwards.
-        let read = [Place::of_bytes(bytes, length), Place::of_bytes(dictionary, dictionary_length), Place::of_optional(limits)];
+        let read = [
+            Place::of_bytes(bytes, length),
+            Place::of_bytes(dictionary, dictionary_length),
+            Place::of_optional(limits),
+        ];
         Place::of_one(out_material).apart_from(&read)?;
         // Whatever was open there is no longer, and no failure from here on leaves anything behind.
         // SAFETY: the caller's promise is that of `write`.
@@ -240,7 +248,10 @@ pub extern "C" fn selvedge_rule_family(rule: u32) -> selvedge_status {
 /// # Safety
 /// As the header says of pointers and of materials.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn selvedge_read_header(material: *const selvedge_material, out: *mut selvedge_header) -> selvedge_status {
+pub unsafe extern "C" fn selvedge_read_header(
+    material: *const selvedge_material,
+    out: *mut selvedge_header,
+) -> selvedge_status {
     // SAFETY: the caller's promise is that of `read_material`.
     let header = unsafe { read_material(material) }.map(|selvedge| selvedge_header::from(selvedge.header()));
     // SAFETY: the caller's promise is that of `write`.
@@ -252,7 +263,10 @@ pub unsafe extern "C" fn selvedge_read_header(material: *const selvedge_material
 /// # Safety
 /// As the header says of pointers and of materials.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn selvedge_read_metadata(material: *const selvedge_material, out: *mut selvedge_metadata) -> selvedge_status {
+pub unsafe extern "C" fn selvedge_read_metadata(
+    material: *const selvedge_material,
+    out: *mut selvedge_metadata,
+) -> selvedge_status {
     let told = || {
         // SAFETY: the caller's promise is that of `read_material`.
         let metadata = unsafe { read_material(material) }?.metadata();
@@ -277,8 +291,13 @@ pub unsafe extern "C" fn selvedge_read_metadata(material: *const selvedge_materi
 /// # Safety
 /// As the header says of pointers and of materials.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn selvedge_with_layers(material: *const selvedge_material, layers: u32, out: *mut selvedge_material) -> selvedge_status {
-    // SAFETY: the caller's promise is that of `read_material`. What comes is a copy, so `out` may be `material`.
+pub unsafe extern "C" fn selvedge_with_layers(
+    material: *const selvedge_material,
+    layers: u32,
+    out: *mut selvedge_material,
+) -> selvedge_status {
+    // SAFETY: the caller's promise is that of `read_material`. What comes is a copy, so `out` may be
+    // `material`.
     let limited = unsafe { read_material(material) }.map(|selvedge| selvedge.with_layers(layers));
     // SAFETY: the caller's promise is that of `write_material`.
     status(limited.and_then(|selvedge| unsafe { write_material(out, selvedge) }))

@@ -1,11 +1,12 @@
 //! Directions, single samples, and the decode digest.
 //!
-//! Floats come and go by pointer alone: their bits then pass no register that could change them, and machines with
-//! another convention for floats agree with this library all the same.
+//! Floats come and go by pointer alone: their bits then pass no register that could change them, and machines
+//! with another convention for floats agree with this library all the same.
 
 use crate::lent::{Checked, read, read_material, status, write};
 use crate::types::{
-    SELVEDGE_DIGEST_LENGTH, selvedge_direction, selvedge_material, selvedge_query, selvedge_rgb, selvedge_status, selvedge_taps, selvedge_values,
+    SELVEDGE_DIGEST_LENGTH, selvedge_direction, selvedge_material, selvedge_query, selvedge_rgb,
+    selvedge_status, selvedge_taps, selvedge_values,
 };
 use selvedge::direction::direction_from_binary32;
 use selvedge::interpolation::{radiance, texel_values, trilinear_values};
@@ -16,7 +17,11 @@ use selvedge::{Direction, FilteredQuery, Selvedge, Taps};
 ///
 /// # Safety
 /// As `read_material` for `material` and `write` for `out`.
-unsafe fn answer<T>(material: *const selvedge_material, out: *mut T, compute: impl FnOnce(&Selvedge<'_>) -> Checked<T>) -> selvedge_status {
+unsafe fn answer<T>(
+    material: *const selvedge_material,
+    out: *mut T,
+    compute: impl FnOnce(&Selvedge<'_>) -> Checked<T>,
+) -> selvedge_status {
     // SAFETY: the caller's promise.
     let result = unsafe { read_material(material) }.and_then(|selvedge| compute(&selvedge));
     // SAFETY: the caller's promise.
@@ -40,7 +45,10 @@ unsafe fn read_both<T: Copy>(light: *const T, view: *const T) -> Checked<(T, T)>
 /// # Safety
 /// As the header says of pointers.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn selvedge_direction_from_vector(vector: *const f32, out: *mut selvedge_direction) -> selvedge_status {
+pub unsafe extern "C" fn selvedge_direction_from_vector(
+    vector: *const f32,
+    out: *mut selvedge_direction,
+) -> selvedge_status {
     // SAFETY: three floats, by the caller's promise; an array is aligned as its elements.
     let direction = unsafe { read(vector.cast::<[f32; 3]>()) }.map(Direction::from_unit_vector);
     // SAFETY: the caller's promise is that of `write`.
@@ -52,12 +60,18 @@ pub unsafe extern "C" fn selvedge_direction_from_vector(vector: *const f32, out:
 /// # Safety
 /// As the header says of pointers.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn selvedge_direction_from_bits(x_bits: u32, y_bits: u32, z_bits: u32, out: *mut selvedge_direction) -> selvedge_status {
+pub unsafe extern "C" fn selvedge_direction_from_bits(
+    x_bits: u32,
+    y_bits: u32,
+    z_bits: u32,
+    out: *mut selvedge_direction,
+) -> selvedge_status {
     // SAFETY: the caller's promise is that of `write`.
     status(unsafe { write(out, direction_from_binary32(x_bits, y_bits, z_bits)) })
 }
 
-/// A position of any magnitude, as the bits of a float, to its u0.32 fraction: [`selvedge::position_from_f32`].
+/// A position of any magnitude, as the bits of a float, to its u0.32 fraction:
+/// [`selvedge::position_from_f32`].
 #[unsafe(no_mangle)]
 pub extern "C" fn selvedge_position_from_bits(position_bits: u32) -> u32 {
     fraction_from_binary32(position_bits)
@@ -68,7 +82,12 @@ pub extern "C" fn selvedge_position_from_bits(position_bits: u32) -> u32 {
 /// # Safety
 /// As the header says of pointers.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn selvedge_query_from_floats(position: *const f32, light: *const f32, view: *const f32, out: *mut selvedge_query) -> selvedge_status {
+pub unsafe extern "C" fn selvedge_query_from_floats(
+    position: *const f32,
+    light: *const f32,
+    view: *const f32,
+    out: *mut selvedge_query,
+) -> selvedge_status {
     let query = || {
         // SAFETY: two floats, by the caller's promise.
         let position = unsafe { read(position.cast::<[f32; 2]>()) }?;
@@ -85,7 +104,11 @@ pub unsafe extern "C" fn selvedge_query_from_floats(position: *const f32, light:
 /// # Safety
 /// As the header says of pointers and of materials.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn selvedge_light_direction(material: *const selvedge_material, index: u32, out: *mut selvedge_direction) -> selvedge_status {
+pub unsafe extern "C" fn selvedge_light_direction(
+    material: *const selvedge_material,
+    index: u32,
+    out: *mut selvedge_direction,
+) -> selvedge_status {
     // SAFETY: the caller's promise is that of `answer`.
     unsafe { answer(material, out, |selvedge| Ok(selvedge.light_direction(index))) }
 }
@@ -95,7 +118,11 @@ pub unsafe extern "C" fn selvedge_light_direction(material: *const selvedge_mate
 /// # Safety
 /// As the header says of pointers and of materials.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn selvedge_view_direction(material: *const selvedge_material, index: u32, out: *mut selvedge_direction) -> selvedge_status {
+pub unsafe extern "C" fn selvedge_view_direction(
+    material: *const selvedge_material,
+    index: u32,
+    out: *mut selvedge_direction,
+) -> selvedge_status {
     // SAFETY: the caller's promise is that of `answer`.
     unsafe { answer(material, out, |selvedge| Ok(selvedge.view_direction(index))) }
 }
@@ -111,7 +138,9 @@ pub unsafe extern "C" fn selvedge_locate_light(
     out: *mut selvedge_taps,
 ) -> selvedge_status {
     // SAFETY: the caller's promise is that of `read`.
-    let compute = |selvedge: &Selvedge<'_>| unsafe { read(direction) }.map(|direction| selvedge.locate_light(direction));
+    let compute = |selvedge: &Selvedge<'_>| {
+        unsafe { read(direction) }.map(|direction| selvedge.locate_light(direction))
+    };
     // SAFETY: the caller's promise is that of `answer`.
     unsafe { answer(material, out, compute) }
 }
@@ -127,7 +156,8 @@ pub unsafe extern "C" fn selvedge_locate_view(
     out: *mut selvedge_taps,
 ) -> selvedge_status {
     // SAFETY: the caller's promise is that of `read`.
-    let compute = |selvedge: &Selvedge<'_>| unsafe { read(direction) }.map(|direction| selvedge.locate_view(direction));
+    let compute =
+        |selvedge: &Selvedge<'_>| unsafe { read(direction) }.map(|direction| selvedge.locate_view(direction));
     // SAFETY: the caller's promise is that of `answer`.
     unsafe { answer(material, out, compute) }
 }
@@ -163,7 +193,9 @@ pub unsafe extern "C" fn selvedge_point_values(
     out: *mut selvedge_values,
 ) -> selvedge_status {
     // SAFETY: the caller's promise is that of `answer`.
-    unsafe { answer(material, out, |selvedge| Ok(selvedge.point_values(texel_x, texel_y, light_index, view_index))) }
+    unsafe {
+        answer(material, out, |selvedge| Ok(selvedge.point_values(texel_x, texel_y, light_index, view_index)))
+    }
 }
 
 /// Channel values of a texel for located directions: [`texel_values`].
@@ -329,7 +361,12 @@ pub unsafe extern "C" fn selvedge_radiance(
 /// # Safety
 /// As the header says of pointers and of materials.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn selvedge_decode_digest(material: *const selvedge_material, out: *mut u8) -> selvedge_status {
+pub unsafe extern "C" fn selvedge_decode_digest(
+    material: *const selvedge_material,
+    out: *mut u8,
+) -> selvedge_status {
     // SAFETY: 32 bytes, by the caller's promise; the rest is that of `answer`.
-    unsafe { answer(material, out.cast::<[u8; SELVEDGE_DIGEST_LENGTH]>(), |selvedge| Ok(selvedge.decode_digest())) }
+    unsafe {
+        answer(material, out.cast::<[u8; SELVEDGE_DIGEST_LENGTH]>(), |selvedge| Ok(selvedge.decode_digest()))
+    }
 }

@@ -73,13 +73,15 @@ pub type selvedge_rgb = Rgb;
 /// Takes a finding; zero ends the validation.
 #[cfg(not(feature = "std"))]
 // One that may unwind would call for a personality function, which firmware does not have.
-pub type selvedge_report = unsafe extern "C" fn(context: *mut c_void, finding: *const selvedge_finding) -> i32;
+pub type selvedge_report =
+    unsafe extern "C" fn(context: *mut c_void, finding: *const selvedge_finding) -> i32;
 
 /// Takes a finding; zero ends the validation.
 ///
 /// The type may unwind, so that a C++ exception thrown through it is an abort and not undefined.
 #[cfg(feature = "std")]
-pub type selvedge_report = unsafe extern "C-unwind" fn(context: *mut c_void, finding: *const selvedge_finding) -> i32;
+pub type selvedge_report =
+    unsafe extern "C-unwind" fn(context: *mut c_void, finding: *const selvedge_finding) -> i32;
 
 /// An open material, in memory of the caller.
 #[repr(C)]
@@ -91,7 +93,8 @@ pub struct selvedge_material {
 
 impl selvedge_material {
     /// What a C program writes as `= {0}`: no open material.
-    pub const CLOSED: selvedge_material = selvedge_material { opaque: [MaybeUninit::new(0); SELVEDGE_MATERIAL_WORDS] };
+    pub const CLOSED: selvedge_material =
+        selvedge_material { opaque: [MaybeUninit::new(0); SELVEDGE_MATERIAL_WORDS] };
 }
 
 /// What the caller is willing to spend: [`Limits`].
@@ -298,7 +301,10 @@ impl From<FilteredQuery> for selvedge_query {
 
 // A batch's queries are read where they lie: an array of ours is an array of the core's.
 const _: () = {
-    assert!(size_of::<selvedge_query>() == size_of::<FilteredQuery>() && align_of::<selvedge_query>() == align_of::<FilteredQuery>());
+    assert!(
+        size_of::<selvedge_query>() == size_of::<FilteredQuery>()
+            && align_of::<selvedge_query>() == align_of::<FilteredQuery>()
+    );
     assert!(offset_of!(selvedge_query, u_q32) == offset_of!(FilteredQuery, u_q32));
     assert!(offset_of!(selvedge_query, v_q32) == offset_of!(FilteredQuery, v_q32));
     assert!(offset_of!(selvedge_query, light) == offset_of!(FilteredQuery, light));

@@ -1,9 +1,11 @@
-//! The examples, in C and in Python: they print the core's words, and tell the right rule and exit code of broken files.
+//! The examples, in C and in Python: they print the core's words, and tell the right rule and exit code of
+//! broken files.
 
 mod common;
 
 use common::{
-    broken_files, c_compiler, compile, compile_well, expected_print, fixture, fixture_bytes, has_program, here, shared_library, skip, text, work_folder,
+    broken_files, c_compiler, compile, compile_well, expected_print, fixture, fixture_bytes, has_program,
+    here, shared_library, skip, text, work_folder,
 };
 use selvedge::{Direction, Family, Limits, open};
 use std::path::Path;
@@ -50,7 +52,9 @@ fn hold_to_core(folder: &Path, mut program: impl FnMut() -> Command) {
 /// The families that broken files have to show: one of each that needs no dictionary.
 #[test]
 fn broken_files_are_of_every_kind() {
-    let families = broken_files().into_iter().map(|(_, bytes)| open(&bytes, &Limits::default()).expect_err("the file is broken").rule.family());
+    let families = broken_files()
+        .into_iter()
+        .map(|(_, bytes)| open(&bytes, &Limits::default()).expect_err("the file is broken").rule.family());
     let families: Vec<_> = families.collect();
     for family in [Family::Invalid, Family::Limits, Family::Unsupported] {
         assert!(families.contains(&family), "{family:?}");
@@ -102,7 +106,8 @@ fn c_is_clean_under_sanitizers() {
     let probe = folder.join("probe.c");
     std::fs::write(&probe, "int main(void) { return 0; }\n").expect("the work folder can be written");
     let probed = folder.join("probe");
-    let works = compile(&probe, &probed, &options).status.success() && Command::new(&probed).status().is_ok_and(|status| status.success());
+    let works = compile(&probe, &probed, &options).status.success()
+        && Command::new(&probed).status().is_ok_and(|status| status.success());
     if !works {
         skip("the example under sanitizers: the compiler has no -fsanitize=address,undefined that runs here");
         return;

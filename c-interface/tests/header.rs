@@ -16,7 +16,9 @@ type Signature = (String, Vec<String>);
 /// The items of all sources.
 fn items() -> Vec<syn::Item> {
     let folder = std::fs::read_dir(here().join("src")).expect("the sources are there");
-    let sources = folder.map(|entry| std::fs::read_to_string(entry.expect("entries can be read").path()).expect("sources are text"));
+    let sources = folder.map(|entry| {
+        std::fs::read_to_string(entry.expect("entries can be read").path()).expect("sources are text")
+    });
     sources.flat_map(|source| syn::parse_file(&source).expect("sources are Rust").items).collect()
 }
 
@@ -24,7 +26,11 @@ fn items() -> Vec<syn::Item> {
 fn c_type(rust: &syn::Type) -> String {
     if let syn::Type::Ptr(pointer) = rust {
         let of = c_type(&pointer.elem);
-        return if matches!(pointer.mutability, syn::PointerMutability::Mut(_)) { format!("{of} *") } else { format!("const {of} *") };
+        return if matches!(pointer.mutability, syn::PointerMutability::Mut(_)) {
+            format!("{of} *")
+        } else {
+            format!("const {of} *")
+        };
     }
     let name = rust.to_token_stream().to_string().replace(' ', "");
     let name = match &name[..] {
@@ -44,12 +50,16 @@ fn c_type(rust: &syn::Type) -> String {
 
 /// Every function that the library exports, from its source.
 fn source_functions() -> BTreeMap<String, Signature> {
-    let functions = items().into_iter().filter_map(|item| if let syn::Item::Fn(function) = item { Some(function) } else { None });
+    let functions = items()
+        .into_iter()
+        .filter_map(|item| if let syn::Item::Fn(function) = item { Some(function) } else { None });
     let exported = functions.filter(|function| function.sig.abi.is_some());
     let signature = |function: syn::ItemFn| {
         let tokens = function.attrs.iter().map(|a| a.to_token_stream().to_string()).collect::<String>();
         assert!(tokens.contains("no_mangle"), "{} is exported by its name", function.sig.ident);
-        let syn::ReturnType::Type(_, result) = &function.sig.output else { panic!("every function has a result") };
+        let syn::ReturnType::Type(_, result) = &function.sig.output else {
+            panic!("every function has a result")
+        };
         let parameters = function.sig.inputs.iter().map(|input| {
             let syn::FnArg::Typed(typed) = input else { panic!("no function has a self") };
             c_type(&typed.ty)
@@ -86,13 +96,19 @@ fn split_declaration(declaration: &str) -> (String, String) {
 /// Every function of the header.
 fn header_functions() -> BTreeMap<String, Signature> {
     let code = header_code();
-    let statements = code.split(';').filter(|statement| statement.contains('(') && !statement.contains("typedef"));
+    let statements =
+        code.split(';').filter(|statement| statement.contains('(') && !statement.contains("typedef"));
     let signature = |statement: &str| {
         // The first one stands behind the opening of `extern "C"`.
         let statement = statement.rsplit('{').next().unwrap_or(statement);
         let (head, parameters) = statement.split_once('(').expect("filtered above");
         let (result, name) = split_declaration(head);
-        let parameters = parameters.trim().strip_suffix(')').expect("parameters end").split(',').filter(|parameter| parameter.trim() != "void");
+        let parameters = parameters
+            .trim()
+            .strip_suffix(')')
+            .expect("parameters end")
+            .split(',')
+            .filter(|parameter| parameter.trim() != "void");
         (name, (result, parameters.map(|parameter| split_declaration(parameter).0).collect()))
     };
     statements.map(signature).collect()
@@ -120,10 +136,14 @@ fn header_constants() -> BTreeSet<String> {
 
 /// Every constant of the source, with its value.
 fn source_constants() -> BTreeMap<String, i64> {
-    let constants = items().into_iter().filter_map(|item| if let syn::Item::Const(constant) = item { Some(constant) } else { None });
+    let constants = items()
+        .into_iter()
+        .filter_map(|item| if let syn::Item::Const(constant) = item { Some(constant) } else { None });
     let public = constants.filter(|constant| matches!(constant.vis, syn::Visibility::Public(_)));
     let value = |constant: syn::ItemConst| {
-        let syn::Expr::Lit(syn::ExprLit { lit: syn::Lit::Int(number), .. }) = &*constant.expr else { panic!("{} is a plain number", constant.ident) };
+        let syn::Expr::Lit(syn::ExprLit { lit: syn::Lit::Int(number), .. }) = &*constant.expr else {
+            panic!("{} is a plain number", constant.ident)
+        };
         (constant.ident.to_string(), number.base10_parse().expect("constants are small"))
     };
     public.map(value).collect()
@@ -172,7 +192,8 @@ fn rust_layouts() -> (BTreeSet<String>, BTreeMap<&'static str, Vec<&'static str>
 /// The structures of the header and their fields, in order.
 fn header_structures() -> BTreeMap<String, Vec<String>> {
     let code = header_code();
-    let bodies = code.split("typedef struct ").skip(1).map(|rest| rest.split_once('}').expect("structures end").0);
+    let bodies =
+        code.split("typedef struct ").skip(1).map(|rest| rest.split_once('}').expect("structures end").0);
     let structure = |body: &str| {
         let (name, fields) = body.split_once('{').expect("structures begin");
         let fields = fields.split(';').filter(|field| !field.trim().is_empty());
@@ -187,7 +208,10 @@ fn names_of_constants_and_fields_are_those_of_the_source() {
     assert_eq!(header_constants(), source_constants().into_keys().collect(), "both define the same numbers");
     let mut header = header_structures();
     assert_eq!(header.remove("selvedge_material"), Some(vec!["opaque".into()]), "a material is closed");
-    let rust = rust_layouts().1.into_iter().map(|(name, fields)| (name.to_string(), fields.into_iter().map(String::from).collect()));
+    let rust = rust_layouts()
+        .1
+        .into_iter()
+        .map(|(name, fields)| (name.to_string(), fields.into_iter().map(String::from).collect()));
     assert_eq!(header, rust.collect(), "both have the same structures");
 }
 
@@ -198,8 +222,10 @@ fn a_c_compiler_agrees() {
     }
     let (mut expected, structures) = rust_layouts();
     let mut program = String::from("#include \"selvedge.h\"\n#include <stdio.h>\n\nint main(void)\n{\n");
-    let put = |program: &mut String, line: String| writeln!(program, "    {line}").expect("a string takes all");
-    // The C compiler holds the header's declarations to the types of the source, and the linker the names to the library.
+    let put =
+        |program: &mut String, line: String| writeln!(program, "    {line}").expect("a string takes all");
+    // The C compiler holds the header's declarations to the types of the source, and the linker the names to
+    // the library.
     for (name, (result, parameters)) in source_functions() {
         let parameters = if parameters.is_empty() { "void".into() } else { parameters.join(", ") };
         put(&mut program, format!("{result} (*at_{name})({parameters}) = {name};"));
@@ -243,10 +269,15 @@ fn a_cpp_compiler_takes_the_header() {
         return;
     }
     let source = work_folder("cpp").join("header.cpp");
-    std::fs::write(&source, "#include \"selvedge.h\"\nint main() { selvedge_material m = {{0}}; return m.opaque[0] != 0; }\n")
-        .expect("the folder can be written");
+    std::fs::write(
+        &source,
+        "#include \"selvedge.h\"\nint main() { selvedge_material m = {{0}}; return m.opaque[0] != 0; }\n",
+    )
+    .expect("the folder can be written");
     let mut command = Command::new(compiler);
-    command.args(["-std=c++11", "-Wall", "-Wextra", "-Werror", "-pedantic", "-fsyntax-only", "-I"]).arg(here().join("include"));
+    command
+        .args(["-std=c++11", "-Wall", "-Wextra", "-Werror", "-pedantic", "-fsyntax-only", "-I"])
+        .arg(here().join("include"));
     let output = command.arg(source).output().expect("the compiler runs");
     assert!(output.status.success(), "{}", text(&output.stderr));
 }

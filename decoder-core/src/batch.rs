@@ -6,7 +6,8 @@
 
 use crate::colour::{Rgb, Values};
 use crate::direction::{
-    Direction, Taps, beyond_hull, clamp_direction, coarse_q14, cross, dot_product, grid_cell, grid_start, hull_start, point, ratio_q15, refine, triangles_start,
+    Direction, Taps, beyond_hull, clamp_direction, coarse_q14, cross, dot_product, grid_cell, grid_start,
+    hull_start, point, ratio_q15, refine, triangles_start,
 };
 use crate::ensemble::{RECORD_BOUND, Record};
 use crate::fixed::{HALF_Q15, ONE_Q15, clamp_magnitude, multiply_q15, round_shift};
@@ -37,7 +38,12 @@ impl FilteredQuery {
     /// From a position of any magnitude, which wraps, and unit vectors in the material's tangent frame.
     pub fn from_f32(position: [f32; 2], light: [f32; 3], view: [f32; 3]) -> FilteredQuery {
         let [u_q32, v_q32] = position.map(position_from_f32);
-        FilteredQuery { u_q32, v_q32, light: Direction::from_unit_vector(light), view: Direction::from_unit_vector(view) }
+        FilteredQuery {
+            u_q32,
+            v_q32,
+            light: Direction::from_unit_vector(light),
+            view: Direction::from_unit_vector(view),
+        }
     }
 }
 
@@ -64,14 +70,26 @@ const COEFFICIENT_WORDS: usize = 2;
 /// Taps in three words: indices below 1,024, weights and cosine up to 2^15; the third weight is what is left.
 fn pack_taps(taps: Taps) -> [i32; 3] {
     let pair = |low: u32, high: u32| (low | high << 16) as i32;
-    [pair(taps.a, taps.b), pair(taps.c, taps.cosine_q15 as u32), pair(taps.weight_a_q15 as u32, taps.weight_b_q15 as u32)]
+    [
+        pair(taps.a, taps.b),
+        pair(taps.c, taps.cosine_q15 as u32),
+        pair(taps.weight_a_q15 as u32, taps.weight_b_q15 as u32),
+    ]
 }
 
 fn unpack_taps([ab, c, weights]: [i32; 3]) -> Taps {
     let (low, high) = (|word: i32| word as u32 & 0xffff, |word: i32| word as u32 >> 16);
     let (weight_a, weight_b) = (low(weights) as i32, high(weights) as i32);
     let weight_c = 32_768i32.wrapping_sub(weight_a).wrapping_sub(weight_b);
-    Taps { a: low(ab), b: high(ab), c: low(c), weight_a_q15: weight_a, weight_b_q15: weight_b, weight_c_q15: weight_c, cosine_q15: high(c) as i32 }
+    Taps {
+        a: low(ab),
+        b: high(ab),
+        c: low(c),
+        weight_a_q15: weight_a,
+        weight_b_q15: weight_b,
+        weight_c_q15: weight_c,
+        cosine_q15: high(c) as i32,
+    }
 }
 
 /// Scratch of one record: columns that it uses, numbered in the order of their first use.
@@ -120,7 +138,10 @@ impl Selvedge<'_> {
             return self.ready_total() + Room::WORDS + TensorSampler::scratch_len(self);
         }
         let per_query = QUERY_WORDS + 4 * (ITEM_WORDS + PART_WORDS);
-        let shared = self.ready_total() + 6 * COLUMNS + 2 * COLUMNS * LANES + self.largest_record() * COEFFICIENT_WORDS;
+        let shared = self.ready_total()
+            + 6 * COLUMNS
+            + 2 * COLUMNS * LANES
+            + self.largest_record() * COEFFICIENT_WORDS;
         count.saturating_mul(per_query).saturating_add(self.block_total() + 1 + shared)
     }
 
@@ -130,7 +151,8 @@ impl Selvedge<'_> {
         if material.full_count == 0 {
             return 0;
         }
-        (block_count(material, material.width) as usize).saturating_mul(block_count(material, material.height) as usize)
+        (block_count(material, material.width) as usize)
+            .saturating_mul(block_count(material, material.height) as usize)
     }
 
     /// Words of both ready sets of directions.
@@ -142,18 +164,31 @@ impl Selvedge<'_> {
     fn largest_record(&self) -> usize {
         let (words, material) = (self.words(), self.material());
         let full = material.channels.iter().filter(|channel| channel.state == CHANNEL_FULL);
-        let stated = |channel: &Channel, layer: u32| word(words, crate::ensemble::coefficients_start(words, material, *channel, 0, layer).wrapping_add(3));
-        full.flat_map(|channel| (0..material.layer_count).map(move |layer| stated(channel, layer))).max().unwrap_or(0) as usize
+        let stated = |channel: &Channel, layer: u32| {
+            word(
+                words,
+                crate::ensemble::coefficients_start(words, material, *channel, 0, layer).wrapping_add(3),
+            )
+        };
+        full.flat_map(|channel| (0..material.layer_count).map(move |layer| stated(channel, layer)))
+            .max()
+            .unwrap_or(0) as usize
     }
 
-    /// Radiance of many filtered samples: `out[i]` equals [`Selvedge::filtered`] of `queries[i]`, bit for bit.
+    /// Radiance of many filtered samples: `out[i]` equals [`Selvedge::filtered`] of `queries[i]`, bit for
+    /// bit.
     ///
-    /// The more queries at once, the more of them share a block; tens of thousands are a good batch, and fewer
-    /// than 2^28 a legal one.
+    /// The more queries at once, the more of them share a block; tens of thousands are a good batch, and
+    /// fewer than 2^28 a legal one.
     ///
     /// # Errors
     /// If `out` is shorter than `queries`, or `scratch` than [`Selvedge::batch_scratch_len`].
-    pub fn sample_batch(&self, queries: &[FilteredQuery], scratch: &mut [i32], out: &mut [Rgb]) -> Result<(), BufferTooSmall> {
+    pub fn sample_batch(
+        &self,
+        queries: &[FilteredQuery],
+        scratch: &mut [i32],
+        out: &mut [Rgb],
+    ) -> Result<(), BufferTooSmall> {
         if out.len() < queries.len() {
             return Err(BufferTooSmall { needed: queries.len(), lent: out.len() });
         }
@@ -237,7 +272,14 @@ impl Selvedge<'_> {
         &self,
         count: usize,
         scratch: &'s mut [i32],
-    ) -> Option<(&'s mut [[i32; QUERY_WORDS]], &'s mut [[i32; ITEM_WORDS]], &'s mut [[i32; PART_WORDS]], &'s mut [i32], &'s mut [i32], Workspace<'s>)> {
+    ) -> Option<(
+        &'s mut [[i32; QUERY_WORDS]],
+        &'s mut [[i32; ITEM_WORDS]],
+        &'s mut [[i32; PART_WORDS]],
+        &'s mut [i32],
+        &'s mut [i32],
+        Workspace<'s>,
+    )> {
         let (states, rest) = scratch.split_at_mut_checked(count.checked_mul(QUERY_WORDS)?)?;
         let (items, rest) = rest.split_at_mut_checked(count.checked_mul(4 * ITEM_WORDS)?)?;
         let (textures, rest) = rest.split_at_mut_checked(count.checked_mul(4 * PART_WORDS)?)?;
@@ -248,8 +290,21 @@ impl Selvedge<'_> {
         let (columns, rest) = rest.split_at_mut_checked(2 * COLUMNS)?;
         let (blended, rest) = rest.split_at_mut_checked(2 * COLUMNS * LANES)?;
         let (coefficients, _) = rest.split_at_mut_checked(self.largest_record() * COEFFICIENT_WORDS)?;
-        let workspace = Workspace { numbers, seen, columns, blended: blended.as_chunks_mut().0, coefficients: coefficients.as_chunks_mut().0 };
-        Some((states.as_chunks_mut().0, items.as_chunks_mut().0, textures.as_chunks_mut().0, starts, ready, workspace))
+        let workspace = Workspace {
+            numbers,
+            seen,
+            columns,
+            blended: blended.as_chunks_mut().0,
+            coefficients: coefficients.as_chunks_mut().0,
+        };
+        Some((
+            states.as_chunks_mut().0,
+            items.as_chunks_mut().0,
+            textures.as_chunks_mut().0,
+            starts,
+            ready,
+            workspace,
+        ))
     }
 
     /// Words of the ready set of directions at `start`.
@@ -270,12 +325,21 @@ impl Selvedge<'_> {
         }
     }
 
-    /// A counting sort of the queries' parts by block: afterwards `starts[b]` is the end of block `b`. Gives the parts.
-    fn sort_by_block(&self, queries: &[FilteredQuery], states: &[[i32; QUERY_WORDS]], items: &mut [[i32; ITEM_WORDS]], starts: &mut [i32]) -> usize {
+    /// A counting sort of the queries' parts by block: afterwards `starts[b]` is the end of block `b`. Gives
+    /// the parts.
+    fn sort_by_block(
+        &self,
+        queries: &[FilteredQuery],
+        states: &[[i32; QUERY_WORDS]],
+        items: &mut [[i32; ITEM_WORDS]],
+        starts: &mut [i32],
+    ) -> usize {
         let material = self.material();
         let blocks_x = block_count(material, material.width);
         let axes = |query: &FilteredQuery| {
-            let axis = |size: u32, position: u32| axis_at_position(material.edge, material.edge_reciprocal_q18, size, position);
+            let axis = |size: u32, position: u32| {
+                axis_at_position(material.edge, material.edge_reciprocal_q18, size, position)
+            };
             (axis(material.width, query.u_q32), axis(material.height, query.v_q32))
         };
         // One, two or four parts; the common case first and alone.
@@ -328,7 +392,13 @@ impl Selvedge<'_> {
 
     /// Unpacks a record and numbers the columns that it uses.
     #[inline(always)]
-    fn unpack(&self, channel: Channel, record: &Record, mark: i32, workspace: &mut Workspace<'_>) -> Unpacked {
+    fn unpack(
+        &self,
+        channel: Channel,
+        record: &Record,
+        mark: i32,
+        workspace: &mut Workspace<'_>,
+    ) -> Unpacked {
         let mut unpacked = Unpacked { count: 0, lights: 0, views: 0 };
         for_each_coefficient(self.words(), channel, record, |c| {
             let light = workspace.number(0, (c.atom >> 14) & 0x3ff, mark, &mut unpacked.lights);
@@ -385,7 +455,13 @@ impl Selvedge<'_> {
                 x_spans[lane & 7] = span(rows, item[2]);
                 y_spans[lane & 7] = span(rows >> 16, item[3]);
             }
-            let total = sum_lanes(coefficients, light_lanes, view_lanes, |x| blend_spans(spatial[0], &x_spans, x), |y| blend_spans(spatial[1], &y_spans, y));
+            let total = sum_lanes(
+                coefficients,
+                light_lanes,
+                view_lanes,
+                |x| blend_spans(spatial[0], &x_spans, x),
+                |y| blend_spans(spatial[1], &y_spans, y),
+            );
             for (textures, total) in sums.iter_mut().zip(total) {
                 if let Some(sum) = textures.get_mut(number) {
                     *sum = sum.wrapping_add(clamp_magnitude(round_shift(total, record.shift), RECORD_BOUND));
@@ -404,7 +480,9 @@ impl Selvedge<'_> {
             let sum = at(light.a, light.weight_a_q15).wrapping_add(at(light.b, light.weight_b_q15));
             multiply_q15(sum.wrapping_add(at(light.c, light.weight_c_q15)), weight)
         };
-        row(view.a, view.weight_a_q15).wrapping_add(row(view.b, view.weight_b_q15)).wrapping_add(row(view.c, view.weight_c_q15))
+        row(view.a, view.weight_a_q15)
+            .wrapping_add(row(view.b, view.weight_b_q15))
+            .wrapping_add(row(view.c, view.weight_c_q15))
     }
 
     /// Means, scales and colour of a query whose textures are summed.
@@ -424,7 +502,8 @@ impl Selvedge<'_> {
             }
             let base_q20 = word(words, channel.mean_start) as i32;
             let shift = 15u32.wrapping_sub(word(words, channel.mean_start.wrapping_add(1)));
-            let mean = round_shift(self.blend_pairs(channel.mean_start, light, view), shift).wrapping_add(base_q20);
+            let mean =
+                round_shift(self.blend_pairs(channel.mean_start, light, view), shift).wrapping_add(base_q20);
             clamp_magnitude(texture.wrapping_add(mean), VALUE_BOUND)
         };
         let [c0, c1, c2] = material.channels;
@@ -476,7 +555,8 @@ impl<'a, 's> ReadySet<'a, 's> {
         let hull = hull_start(words, start);
         for (number, ready) in (0u32..).zip(edges.iter_mut()) {
             let next = if number.wrapping_add(1) < count { number.wrapping_add(1) } else { 0 };
-            let [first, reciprocal] = [0, 1].map(|n| word(words, hull.wrapping_add(number.wrapping_mul(2)).wrapping_add(n)));
+            let [first, reciprocal] =
+                [0, 1].map(|n| word(words, hull.wrapping_add(number.wrapping_mul(2)).wrapping_add(n)));
             let other = word(words, hull.wrapping_add(next.wrapping_mul(2))) & 0xffff;
             let (a, b) = (at(first & 0xffff), at(other));
             let [x, y, c] = line(|x, y| dot_product(a.0, a.1, b.0, b.1, x, y));
@@ -484,7 +564,14 @@ impl<'a, 's> ReadySet<'a, 's> {
             let length = dot_product(a.0, a.1, b.0, b.1, b.0, b.1);
             *ready = [x, y, c, ox, oy, oc, length, first as i32, reciprocal as i32, other as i32];
         }
-        ReadySet { words, start, grid: grid_start(words, start), grid_size: word(words, start.wrapping_add(3)), triangles, edges }
+        ReadySet {
+            words,
+            start,
+            grid: grid_start(words, start),
+            grid_size: word(words, start.wrapping_add(3)),
+            triangles,
+            edges,
+        }
     }
 
     /// [`crate::direction::locate`], the same bits.
@@ -499,7 +586,11 @@ impl<'a, 's> ReadySet<'a, 's> {
         let last = word(self.words, self.grid.wrapping_add(cell).wrapping_add(1));
         for candidate in first..last {
             let number = word(self.words, candidates.wrapping_add(candidate));
-            let Some(&[a0, a1, a2, b0, b1, b2, c0, c1, c2, first, second, reciprocal]) = self.triangles.get(number as usize) else { break };
+            let Some(&[a0, a1, a2, b0, b1, b2, c0, c1, c2, first, second, reciprocal]) =
+                self.triangles.get(number as usize)
+            else {
+                break;
+            };
             let area_a = at_point(a0, a1, a2, p);
             let area_b = at_point(b0, b1, b2, p);
             let area_c = at_point(c0, c1, c2, p);
@@ -507,8 +598,18 @@ impl<'a, 's> ReadySet<'a, 's> {
                 let whole = area_a.wrapping_add(area_b).wrapping_add(area_c);
                 let shift = second as u32 >> 16;
                 let rest = (direction.x_q18.wrapping_sub(p.0 << 4), direction.y_q18.wrapping_sub(p.1 << 4));
-                let weight_a = ratio_q15(refine(area_a, whole, a0, a1, rest.0, rest.1), shift, reciprocal as u32, ONE_Q15);
-                let weight_b = ratio_q15(refine(area_b, whole, b0, b1, rest.0, rest.1), shift, reciprocal as u32, ONE_Q15.wrapping_sub(weight_a));
+                let weight_a = ratio_q15(
+                    refine(area_a, whole, a0, a1, rest.0, rest.1),
+                    shift,
+                    reciprocal as u32,
+                    ONE_Q15,
+                );
+                let weight_b = ratio_q15(
+                    refine(area_b, whole, b0, b1, rest.0, rest.1),
+                    shift,
+                    reciprocal as u32,
+                    ONE_Q15.wrapping_sub(weight_a),
+                );
                 return Taps {
                     a: first as u32 & 0xffff,
                     b: first as u32 >> 16,
@@ -540,7 +641,12 @@ impl<'a, 's> ReadySet<'a, 's> {
             let a = edge[7] as u32 & 0xffff;
             if (along | left | outside) >= 0 {
                 let rest = (direction.x_q18.wrapping_sub(p.0 << 4), direction.y_q18.wrapping_sub(p.1 << 4));
-                let weight_b = ratio_q15(refine(along, edge[6], edge[0], edge[1], rest.0, rest.1), edge[7] as u32 >> 16, edge[8] as u32, ONE_Q15);
+                let weight_b = ratio_q15(
+                    refine(along, edge[6], edge[0], edge[1], rest.0, rest.1),
+                    edge[7] as u32 >> 16,
+                    edge[8] as u32,
+                    ONE_Q15,
+                );
                 return beyond_hull(self.words, self.start, direction, a, edge[9] as u32, weight_b);
             }
             if past_previous & (along < 0) {
@@ -602,7 +708,10 @@ fn sum_lanes(
             }
             spatial = next;
         }
-        let (Some(light), Some(view)) = (light_lanes.get(((atom >> 14) & 0x3ff) as usize), view_lanes.get(((atom >> 4) & 0x3ff) as usize)) else {
+        let (Some(light), Some(view)) = (
+            light_lanes.get(((atom >> 14) & 0x3ff) as usize),
+            view_lanes.get(((atom >> 4) & 0x3ff) as usize),
+        ) else {
             continue;
         };
         // Rounding as in `round_shift`, for a shift that all lanes share.

@@ -97,9 +97,14 @@ impl<'a, 's> Check<'a, 's> {
         let table = self.bytes.get(offset as usize..(offset as usize).saturating_add(length)).unwrap_or(&[]);
         let (pairs, _) = table.as_chunks::<4>();
         // One pass without branches says whether anything is wrong; only then is it looked for.
-        let banned = pairs.iter().fold(false, |bad, &[a, b, c, d]| bad | (u16::from_le_bytes([a, b]) == 0x8000) | (u16::from_le_bytes([c, d]) == 0x8000));
+        let banned = pairs.iter().fold(false, |bad, &[a, b, c, d]| {
+            bad | (u16::from_le_bytes([a, b]) == 0x8000) | (u16::from_le_bytes([c, d]) == 0x8000)
+        });
         let odd = columns & 1 == 1;
-        let unused = odd && pairs.chunks_exact((row_words as usize).max(1)).any(|row| row.last().is_some_and(|&[_, _, c, d]| c | d != 0));
+        let unused = odd
+            && pairs
+                .chunks_exact((row_words as usize).max(1))
+                .any(|row| row.last().is_some_and(|&[_, _, c, d]| c | d != 0));
         if !banned && !unused {
             return;
         }

@@ -35,7 +35,9 @@ pub struct Rgb {
 /// Values are within 2^27 and entries below 4, so the sum of three stays below 2^31.
 pub fn matrix_row(m0: i32, m1: i32, m2: i32, values: Values) -> i32 {
     // 7.1-2: each product is rounded, the sum is exact.
-    multiply_q13(values.c0, m0).wrapping_add(multiply_q13(values.c1, m1)).wrapping_add(multiply_q13(values.c2, m2))
+    multiply_q13(values.c0, m0)
+        .wrapping_add(multiply_q13(values.c1, m1))
+        .wrapping_add(multiply_q13(values.c2, m2))
 }
 
 /// `mantissa * 2^(exponent - 31)` times a Q15 factor, as binary32 bits (7.4-1).
@@ -116,7 +118,10 @@ mod tests {
             if exact <= 0.0 {
                 assert!(got < 2e-12, "{i}");
             } else {
-                assert!((got - exact).abs() <= (exact + offset as f64) * 6e-8 + exact * 6e-8, "{i} {got} {exact}");
+                assert!(
+                    (got - exact).abs() <= (exact + offset as f64) * 6e-8 + exact * 6e-8,
+                    "{i} {got} {exact}"
+                );
             }
             let half = f32::from_bits(transfer_log2(i, mantissa, exponent, ONE_Q15 / 2)) as f64;
             assert!((half - got / 2.0).abs() <= got * 6.1e-8);

@@ -12,20 +12,20 @@ pub const fn record_operations(count: u32, edge: u32) -> u64 {
     9 * n + 4 * changes_x + 4 * changes_y + 8
 }
 
-/// Operations of a layer of a sparse tensor at worst (4.2-4): four lists of `count` coefficients over `atoms` ABRDF atoms,
-/// with `entries` in a fibre.
+/// Operations of a layer of a sparse tensor at worst (4.2-4): four lists of `count` coefficients over `atoms`
+/// ABRDF atoms, with `entries` in a fibre.
 ///
-/// A coefficient takes two weights (3). An atom is evaluated once, whatever number of texels use it: for each of three
-/// fibres an entry takes its weight (1), blends three channels of a light atom (9) and multiplies them (3); then the
-/// weight goes into three channels (6).
+/// A coefficient takes two weights (3). An atom is evaluated once, whatever number of texels use it: for each
+/// of three fibres an entry takes its weight (1), blends three channels of a light atom (9) and multiplies
+/// them (3); then the weight goes into three channels (6).
 pub const fn layer_operations(count: u32, atoms: u32, entries: u32) -> u64 {
     let met = 4 * count as u64;
     let distinct = if met < atoms as u64 { met } else { atoms as u64 };
     3 * met + distinct * (39 * entries as u64 + 6)
 }
 
-/// Operations to locate a direction at worst (4.2-3): the grid (2), every candidate (6), every edge of the hull
-/// (6), the begin of the hull, what refines, a ratio and two cosines (7).
+/// Operations to locate a direction at worst (4.2-3): the grid (2), every candidate (6), every edge of the
+/// hull (6), the begin of the hull, what refines, a ratio and two cosines (7).
 const fn locate_operations(candidates: u32, hull_count: u32) -> u64 {
     2 + 6 * candidates as u64 + 6 * hull_count as u64 + 7
 }
@@ -45,11 +45,13 @@ pub struct Shape {
 
 /// Operations of a filtered sample at worst (4.2-1), limited to 32 bits.
 ///
-/// `textures` is the largest sum, over the levels, of four times [`record_operations`] of every layer and channel, or
-/// of [`layer_operations`] of every layer.
+/// `textures` is the largest sum, over the levels, of four times [`record_operations`] of every layer and
+/// channel, or of [`layer_operations`] of every layer.
 pub fn filtered_operations(shape: Shape, textures: u64) -> u32 {
-    let ([light_candidates, view_candidates], [light_hull, view_hull]) = (shape.candidates, shape.hull_counts);
-    let (light, view) = (locate_operations(light_candidates, light_hull), locate_operations(view_candidates, view_hull));
+    let ([light_candidates, view_candidates], [light_hull, view_hull]) =
+        (shape.candidates, shape.hull_counts);
+    let (light, view) =
+        (locate_operations(light_candidates, light_hull), locate_operations(view_candidates, view_hull));
     let axes = 18;
     let colour = 102;
     let sum = axes + light + view + 15 * shape.means as u64 + 17 * shape.scales as u64 + textures + colour;

@@ -44,7 +44,8 @@ fn at(table: usize, word: u32) -> u32 {
 #[cfg(feature = "batch")]
 #[inline(always)]
 fn at_word(table: usize, word: u32) -> u32 {
-    (at(table.wrapping_add(3), word) ^ at(table.wrapping_add(2), word >> 8)) ^ (at(table.wrapping_add(1), word >> 16) ^ at(table, word >> 24))
+    (at(table.wrapping_add(3), word) ^ at(table.wrapping_add(2), word >> 8))
+        ^ (at(table.wrapping_add(1), word >> 16) ^ at(table, word >> 24))
 }
 
 /// Strides of sixteen bytes: the checksum so far meets the first word, the others wait for nothing.
@@ -52,7 +53,8 @@ fn at_word(table: usize, word: u32) -> u32 {
 fn strides(mut crc: u32, bytes: &[u8]) -> (u32, &[u8]) {
     let (chunks, rest) = bytes.as_chunks::<STRIDE>();
     for &[a0, a1, a2, a3, b0, b1, b2, b3, c0, c1, c2, c3, d0, d1, d2, d3] in chunks {
-        let behind = at_word(8, u32::from_le_bytes([b0, b1, b2, b3])) ^ at_word(4, u32::from_le_bytes([c0, c1, c2, c3]));
+        let behind = at_word(8, u32::from_le_bytes([b0, b1, b2, b3]))
+            ^ at_word(4, u32::from_le_bytes([c0, c1, c2, c3]));
         let behind = behind ^ at_word(0, u32::from_le_bytes([d0, d1, d2, d3]));
         crc = at_word(12, crc ^ u32::from_le_bytes([a0, a1, a2, a3])) ^ behind;
     }

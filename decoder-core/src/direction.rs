@@ -44,11 +44,13 @@ pub struct Taps {
     pub weight_b_q15: i32,
     /// Weight of the third.
     pub weight_c_q15: i32,
-    /// Cosine asked for over cosine sampled: `ONE_Q15` within the hull, less beyond it, zero below the horizon.
+    /// Cosine asked for over cosine sampled: `ONE_Q15` within the hull, less beyond it, zero below the
+    /// horizon.
     pub cosine_q15: i32,
 }
 
-/// `|value|` as Q30 with its sign, from binary32 bits; magnitudes of one and more, infinities and NaN give one (5.2-1).
+/// `|value|` as Q30 with its sign, from binary32 bits; magnitudes of one and more, infinities and NaN give
+/// one (5.2-1).
 pub fn binary32_to_q30(bits: u32) -> i32 {
     let exponent = (bits >> 23) & 0xff;
     let mantissa = (bits & 0x7f_ffff) | 0x80_0000;
@@ -81,7 +83,11 @@ pub fn direction_from_binary32(x_bits: u32, y_bits: u32, z_bits: u32) -> Directi
     let z_q30 = binary32_to_q30(z_bits);
     // 5.2-3: below the horizon the point is that of the mirrored vector and the cosine is zero.
     let d = (ONE_Q30 as u32).wrapping_add(z_q30.unsigned_abs());
-    Direction { x_q18: project_q18(x_q30, d), y_q18: project_q18(y_q30, d), z_q15: round_shift(z_q30.max(0), 15) }
+    Direction {
+        x_q18: project_q18(x_q30, d),
+        y_q18: project_q18(y_q30, d),
+        z_q15: round_shift(z_q30.max(0), 15),
+    }
 }
 
 /// The direction with every part within its range (5.1-2).
@@ -97,14 +103,26 @@ pub fn clamp_direction(direction: Direction) -> Direction {
 /// One sample direction alone (5.1-3).
 pub fn single_tap(index: u32) -> Taps {
     // 5.1-3: the other two weights are zero.
-    Taps { a: index, b: index, c: index, weight_a_q15: ONE_Q15, weight_b_q15: 0, weight_c_q15: 0, cosine_q15: ONE_Q15 }
+    Taps {
+        a: index,
+        b: index,
+        c: index,
+        weight_a_q15: ONE_Q15,
+        weight_b_q15: 0,
+        weight_c_q15: 0,
+        cosine_q15: ONE_Q15,
+    }
 }
 
 /// A sample direction as a query (5.1-4).
 pub fn sample_direction(words: Words<'_>, start: u32, index: u32) -> Direction {
     let pair = point(words, start, index);
     // 5.1-4: the same point with four zero bits, and its cosine.
-    Direction { x_q18: low_i16(pair) << 4, y_q18: high_i16(pair) << 4, z_q15: point_z_q15(words, start, index) }
+    Direction {
+        x_q18: low_i16(pair) << 4,
+        y_q18: high_i16(pair) << 4,
+        z_q15: point_z_q15(words, start, index),
+    }
 }
 
 /// First word of the sample directions of the set at `start` (5.3).
@@ -160,7 +178,8 @@ pub fn coarse_q14(q18: i32) -> i32 {
     q18.wrapping_add(8) >> 4
 }
 
-/// An area or a product along an edge, moved by what a query has beyond 14 fraction bits, and kept from zero to the whole (5.4-7).
+/// An area or a product along an edge, moved by what a query has beyond 14 fraction bits, and kept from zero
+/// to the whole (5.4-7).
 ///
 /// `step_x` and `step_y` are what one unit of Q14 adds, at most 2^15; the rests are -8 to 7 sixteenths.
 pub fn refine(part: i32, whole: i32, step_x: i32, step_y: i32, rest_x: i32, rest_y: i32) -> i32 {
@@ -190,7 +209,8 @@ pub fn locate(words: Words<'_>, start: u32, asked: Direction) -> Taps {
     let mut candidate = word(words, grid.wrapping_add(cell));
     // 5.6-1: the first candidate that has the point inside or on its border.
     while candidate < last {
-        let triangle = triangles.wrapping_add(word(words, candidates.wrapping_add(candidate)).wrapping_mul(3));
+        let triangle =
+            triangles.wrapping_add(word(words, candidates.wrapping_add(candidate)).wrapping_mul(3));
         let first = word(words, triangle);
         let second = word(words, triangle.wrapping_add(1));
         let a = first & 0xffff;
@@ -210,7 +230,8 @@ pub fn locate(words: Words<'_>, start: u32, asked: Direction) -> Taps {
         let area_c = cross(ax, ay, bx, by, px, py);
         // One test for three signs: the sign bit of the union is set if any is negative.
         if (area_a | area_b | area_c) >= 0 {
-            // 5.6-2: two weights by reciprocal, from areas at the query's full precision; the last is what is left.
+            // 5.6-2: two weights by reciprocal, from areas at the query's full precision; the last is what is
+            // left.
             let rest_x = direction.x_q18.wrapping_sub(px << 4);
             let rest_y = direction.y_q18.wrapping_sub(py << 4);
             let whole = area_a.wrapping_add(area_b).wrapping_add(area_c);
@@ -223,7 +244,15 @@ pub fn locate(words: Words<'_>, start: u32, asked: Direction) -> Taps {
             let weight_c = ONE_Q15.wrapping_sub(weight_a).wrapping_sub(weight_b);
             // 5.6-3: at and below the horizon no light arrives.
             let cosine = if direction.z_q15 > 0 { ONE_Q15 } else { 0 };
-            return Taps { a, b, c, weight_a_q15: weight_a, weight_b_q15: weight_b, weight_c_q15: weight_c, cosine_q15: cosine };
+            return Taps {
+                a,
+                b,
+                c,
+                weight_a_q15: weight_a,
+                weight_b_q15: weight_b,
+                weight_c_q15: weight_c,
+                cosine_q15: cosine,
+            };
         }
         candidate = candidate.wrapping_add(1);
     }
@@ -241,11 +270,16 @@ pub fn locate_on_hull(words: Words<'_>, start: u32, direction: Direction) -> Tap
         return beyond_hull(words, start, direction, 0, 0, 0);
     }
     // 5.7-1: the last edge is looked at first, so that the first knows what precedes it.
-    let last = point(words, start, word(words, hull.wrapping_add(hull_count.wrapping_sub(1).wrapping_mul(2))) & 0xffff);
+    let last = point(
+        words,
+        start,
+        word(words, hull.wrapping_add(hull_count.wrapping_sub(1).wrapping_mul(2))) & 0xffff,
+    );
     let mut first = word(words, hull);
     let mut a = first & 0xffff;
     let mut point_a = point(words, start, a);
-    let mut past_previous = dot_product(low_i16(point_a), high_i16(point_a), low_i16(last), high_i16(last), px, py) < 0;
+    let mut past_previous =
+        dot_product(low_i16(point_a), high_i16(point_a), low_i16(last), high_i16(last), px, py) < 0;
     let mut corner = a;
     let mut edge = 0u32;
     while edge < hull_count {
@@ -265,7 +299,14 @@ pub fn locate_on_hull(words: Words<'_>, start: u32, direction: Direction) -> Tap
             let reciprocal = word(words, hull.wrapping_add(edge.wrapping_mul(2)).wrapping_add(1));
             let rest_x = direction.x_q18.wrapping_sub(px << 4);
             let rest_y = direction.y_q18.wrapping_sub(py << 4);
-            let fine = refine(along, along.wrapping_add(left), bx.wrapping_sub(ax), by.wrapping_sub(ay), rest_x, rest_y);
+            let fine = refine(
+                along,
+                along.wrapping_add(left),
+                bx.wrapping_sub(ax),
+                by.wrapping_sub(ay),
+                rest_x,
+                rest_y,
+            );
             let weight_b = ratio_q15(fine, first >> 16, reciprocal, ONE_Q15);
             return beyond_hull(words, start, direction, a, b, weight_b);
         }
@@ -293,7 +334,14 @@ pub fn dot_product(ax: i32, ay: i32, bx: i32, by: i32, px: i32, py: i32) -> i32 
 }
 
 /// Two directions of the hull, and the cosine beyond it (5.7-5).
-pub fn beyond_hull(words: Words<'_>, start: u32, direction: Direction, a: u32, b: u32, weight_b: i32) -> Taps {
+pub fn beyond_hull(
+    words: Words<'_>,
+    start: u32,
+    direction: Direction,
+    a: u32,
+    b: u32,
+    weight_b: i32,
+) -> Taps {
     let weight_a = ONE_Q15.wrapping_sub(weight_b);
     let za = point_z_q15(words, start, a).wrapping_mul(weight_a);
     let zb = point_z_q15(words, start, b).wrapping_mul(weight_b);
@@ -315,9 +363,14 @@ mod tests {
         let mut state = 1u32;
         for i in 0..200_000u32 {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            let value = if i % 2 == 0 { f32::from_bits(state) } else { (state as i32) as f32 / 2_147_483_648.0 };
+            let value =
+                if i % 2 == 0 { f32::from_bits(state) } else { (state as i32) as f32 / 2_147_483_648.0 };
             let got = binary32_to_q30(value.to_bits());
-            let exact = if value.is_nan() { if value.is_sign_negative() { -1.0 } else { 1.0 } } else { (value as f64).clamp(-1.0, 1.0) };
+            let exact = if value.is_nan() {
+                if value.is_sign_negative() { -1.0 } else { 1.0 }
+            } else {
+                (value as f64).clamp(-1.0, 1.0)
+            };
             let want = (exact.abs() * ONE_Q30 as f64 + 0.5).floor().copysign(exact);
             assert_eq!(got as f64, want, "{value}");
         }

@@ -115,7 +115,9 @@ pub(crate) fn largest_candidates(check: &Check<'_, '_>, section: Section) -> (u3
     let start = check.section_start(section);
     let grid = grid_start(check.words, start);
     let size = word(check.words, start + 3);
-    let largest = (0..size * size).map(|cell| word(check.words, grid + cell + 1) - word(check.words, grid + cell)).max();
+    let largest = (0..size * size)
+        .map(|cell| word(check.words, grid + cell + 1) - word(check.words, grid + cell))
+        .max();
     (largest.unwrap_or(0), word(check.words, start + 2))
 }
 
@@ -127,13 +129,19 @@ pub(crate) fn check_directions(check: &mut Check<'_, '_>, section: Section, coun
         return false;
     }
     let field = |n: u32| word(check.words, start + n);
-    let (stated, triangle_count, hull_count, grid_size, candidate_count) = (field(0), field(1), field(2), field(3), field(4));
+    let (stated, triangle_count, hull_count, grid_size, candidate_count) =
+        (field(0), field(1), field(2), field(3), field(4));
     let counts = [
         (0, stated, stated == count),
         (
             4,
             triangle_count,
-            triangle_count <= 2048 && if triangle_count > 0 { hull_count >= 3 && triangle_count + 2 + hull_count.min(4096) == 2 * count } else { true },
+            triangle_count <= 2048
+                && if triangle_count > 0 {
+                    hull_count >= 3 && triangle_count + 2 + hull_count.min(4096) == 2 * count
+                } else {
+                    true
+                },
         ),
         (8, hull_count, if triangle_count > 0 { hull_count <= count } else { hull_count == 2 * (count - 1) }),
         (12, grid_size, (1..=64).contains(&grid_size)),
@@ -149,15 +157,35 @@ pub(crate) fn check_directions(check: &mut Check<'_, '_>, section: Section, coun
     if !sound {
         return false;
     }
-    let expected = 32 + count * 8 + triangle_count * 12 + hull_count * 8 + (grid_size * grid_size + 1) * 4 + candidate_count * 4;
+    let expected = 32
+        + count * 8
+        + triangle_count * 12
+        + hull_count * 8
+        + (grid_size * grid_size + 1) * 4
+        + candidate_count * 4;
     if !check.ensure(section.length == expected, Rule::DirectionsLength, offset, section.length) {
         return false;
     }
     let triangles = triangles_start(check.words, start);
     let hull = hull_start(check.words, start);
     let grid = grid_start(check.words, start);
-    let set = Set { start, offset, count, triangle_count, hull_count, grid_size, candidate_count, triangles, hull, grid };
-    check_points(check, &set) && check_triangles(check, &set) && check_grid(check, &set) && check_hull(check, &set) && check_cover(check, &set)
+    let set = Set {
+        start,
+        offset,
+        count,
+        triangle_count,
+        hull_count,
+        grid_size,
+        candidate_count,
+        triangles,
+        hull,
+        grid,
+    };
+    check_points(check, &set)
+        && check_triangles(check, &set)
+        && check_grid(check, &set)
+        && check_hull(check, &set)
+        && check_cover(check, &set)
 }
 
 fn check_points(check: &mut Check<'_, '_>, set: &Set) -> bool {
@@ -168,7 +196,12 @@ fn check_points(check: &mut Check<'_, '_>, set: &Set) -> bool {
         // Within the square first: beyond it the sum of squares could overflow.
         let inside = x.abs() <= 16384 && y.abs() <= 16384 && x * x + y * y <= 1 << 28;
         let differs = (0..i).all(|other| set.point(check, other) != (x, y));
-        sound &= check.ensure(inside && differs, Rule::DirectionPoint, at, word(check.words, set.start + 8 + i * 2));
+        sound &= check.ensure(
+            inside && differs,
+            Rule::DirectionPoint,
+            at,
+            word(check.words, set.start + 8 + i * 2),
+        );
         let cosine = word(check.words, set.start + 9 + i * 2);
         sound &= check.ensure(!inside || cosine == cosine_of(x, y), Rule::DirectionCosine, at + 4, cosine);
         if check.stopped {
@@ -192,7 +225,8 @@ fn check_triangles(check: &mut Check<'_, '_>, set: &Set) -> bool {
         } else {
             0
         };
-        if !check.ensure(named && area > 0, Rule::TriangleShape, at, word(check.words, set.triangles + t * 3)) {
+        if !check.ensure(named && area > 0, Rule::TriangleShape, at, word(check.words, set.triangles + t * 3))
+        {
             sound = false;
             if check.stopped {
                 return false;
@@ -200,10 +234,16 @@ fn check_triangles(check: &mut Check<'_, '_>, set: &Set) -> bool {
             continue;
         }
         let (shift, reciprocal) = reciprocal_of(area as u32);
-        let (second, third) = (word(check.words, set.triangles + t * 3 + 1), word(check.words, set.triangles + t * 3 + 2));
+        let (second, third) =
+            (word(check.words, set.triangles + t * 3 + 1), word(check.words, set.triangles + t * 3 + 2));
         sound &= check.ensure(second >> 16 == shift, Rule::TriangleReciprocal, at + 6, second >> 16);
         sound &= check.ensure(third == reciprocal, Rule::TriangleReciprocal, at + 8, third);
-        sound &= check.ensure(before.is_none_or(|before| before < corners), Rule::TriangleOrder, at, word(check.words, set.triangles + t * 3));
+        sound &= check.ensure(
+            before.is_none_or(|before| before < corners),
+            Rule::TriangleOrder,
+            at,
+            word(check.words, set.triangles + t * 3),
+        );
         before = Some(corners);
         if check.stopped {
             return false;
@@ -226,7 +266,12 @@ fn check_grid(check: &mut Check<'_, '_>, set: &Set) -> bool {
         if !check.ensure(holds, Rule::GridStarts, set.byte(set.grid + cell), from) {
             return false;
         }
-        if !check.ensure(from - before <= CELL_LIMIT, Rule::GridCell, set.byte(set.grid + cell), from - before) {
+        if !check.ensure(
+            from - before <= CELL_LIMIT,
+            Rule::GridCell,
+            set.byte(set.grid + cell),
+            from - before,
+        ) {
             return false;
         }
         before = from;
@@ -239,7 +284,9 @@ fn check_grid(check: &mut Check<'_, '_>, set: &Set) -> bool {
             let mut previous = None;
             for at in word(check.words, set.grid + cell)..word(check.words, set.grid + cell + 1) {
                 let triangle = word(check.words, candidates + at);
-                let holds = triangle < set.triangle_count && previous.is_none_or(|p| p < triangle) && meets_cell(set.triangle(check, triangle), x, y);
+                let holds = triangle < set.triangle_count
+                    && previous.is_none_or(|p| p < triangle)
+                    && meets_cell(set.triangle(check, triangle), x, y);
                 sound &= check.ensure(holds, Rule::GridCandidate, set.byte(candidates + at), triangle);
                 previous = Some(triangle);
                 if check.stopped {
@@ -261,7 +308,11 @@ fn check_grid(check: &mut Check<'_, '_>, set: &Set) -> bool {
         };
         for cell_y in span(|p| p.1) {
             for cell_x in span(|p| p.0) {
-                meetings += meets_cell(triangle, cell_range(cell_x, set.grid_size), cell_range(cell_y, set.grid_size)) as u32;
+                meetings += meets_cell(
+                    triangle,
+                    cell_range(cell_x, set.grid_size),
+                    cell_range(cell_y, set.grid_size),
+                ) as u32;
             }
         }
     }
@@ -290,14 +341,20 @@ fn check_hull(check: &mut Check<'_, '_>, set: &Set) -> bool {
         if set.hull_count == 0 {
             break;
         }
-        let [p, q, r] = [edge, edge + 1, edge + 2].map(|n| set.point(check, set.hull_vertex(check, n % set.hull_count)));
+        let [p, q, r] =
+            [edge, edge + 1, edge + 2].map(|n| set.point(check, set.hull_vertex(check, n % set.hull_count)));
         let turn = cross(p.0, p.1, q.0, q.1, r.0, r.1);
         let back = dot_product(q.0, q.1, p.0, p.1, r.0, r.1) > 0;
         let flat = set.triangle_count == 0;
         // A flat set goes along a line and back: straight on but for its two ends, where it returns.
         let end = flat && (edge + 1) % set.hull_count % (set.hull_count / 2).max(1) == 0;
         let turns = if flat { turn == 0 && back == end } else { turn > 0 || turn == 0 && !back };
-        if !check.ensure(turns, Rule::HullConvex, set.byte(set.hull + (edge % set.hull_count) * 2), edge % set.hull_count) {
+        if !check.ensure(
+            turns,
+            Rule::HullConvex,
+            set.byte(set.hull + (edge % set.hull_count) * 2),
+            edge % set.hull_count,
+        ) {
             return false;
         }
         let (dx, dy) = (q.0 - p.0, q.1 - p.1);
@@ -332,7 +389,9 @@ fn check_cover(check: &mut Check<'_, '_>, set: &Set) -> bool {
     }
     if set.triangle_count == 0 {
         // Going along the line and back names every direction.
-        let all = (0..set.count).all(|i| set.hull_count == 0 || (0..set.hull_count).any(|edge| set.hull_vertex(check, edge) == i));
+        let all = (0..set.count).all(|i| {
+            set.hull_count == 0 || (0..set.hull_count).any(|edge| set.hull_vertex(check, edge) == i)
+        });
         return check.ensure(all, Rule::Cover, set.byte(set.hull), 0);
     }
     for edge in 0..set.hull_count {
@@ -372,9 +431,16 @@ mod tests {
     /// Whether two segments have a point in common.
     fn meet((a, b): (Point, Point), (c, d): (Point, Point)) -> bool {
         let side = |a: Point, b: Point, p: Point| cross(a.0, a.1, b.0, b.1, p.0, p.1).signum();
-        let between =
-            |a: Point, b: Point, p: Point| (a.0.min(b.0)..=a.0.max(b.0)).contains(&p.0) && (a.1.min(b.1)..=a.1.max(b.1)).contains(&p.1) && side(a, b, p) == 0;
-        (side(a, b, c) * side(a, b, d) < 0 && side(c, d, a) * side(c, d, b) < 0) || between(a, b, c) || between(a, b, d) || between(c, d, a) || between(c, d, b)
+        let between = |a: Point, b: Point, p: Point| {
+            (a.0.min(b.0)..=a.0.max(b.0)).contains(&p.0)
+                && (a.1.min(b.1)..=a.1.max(b.1)).contains(&p.1)
+                && side(a, b, p) == 0
+        };
+        (side(a, b, c) * side(a, b, d) < 0 && side(c, d, a) * side(c, d, b) < 0)
+            || between(a, b, c)
+            || between(a, b, d)
+            || between(c, d, a)
+            || between(c, d, b)
     }
 
     #[test]
@@ -395,11 +461,20 @@ mod tests {
             }
             let ((x, y), (width, height)) = ((next(13), next(13)), (next(6), next(6)));
             let corners = [(x, y), (x + width, y), (x + width, y + height), (x, y + height)];
-            let sides = |points: &[Point]| -> [(Point, Point); 4] { core::array::from_fn(|i| (points[i % points.len()], points[(i + 1) % points.len()])) };
-            let expected = triangle.iter().any(|p| (x..=x + width).contains(&p.0) && (y..=y + height).contains(&p.1))
-                || corners.iter().any(|&p| holds(triangle, p))
-                || sides(&triangle)[..3].iter().any(|&side| sides(&corners).iter().any(|&other| meet(side, other)));
-            assert_eq!(meets_cell(triangle, (x, x + width), (y, y + height)), expected, "{triangle:?}, {corners:?}");
+            let sides = |points: &[Point]| -> [(Point, Point); 4] {
+                core::array::from_fn(|i| (points[i % points.len()], points[(i + 1) % points.len()]))
+            };
+            let expected =
+                triangle.iter().any(|p| (x..=x + width).contains(&p.0) && (y..=y + height).contains(&p.1))
+                    || corners.iter().any(|&p| holds(triangle, p))
+                    || sides(&triangle)[..3]
+                        .iter()
+                        .any(|&side| sides(&corners).iter().any(|&other| meet(side, other)));
+            assert_eq!(
+                meets_cell(triangle, (x, x + width), (y, y + height)),
+                expected,
+                "{triangle:?}, {corners:?}"
+            );
             met[usize::from(expected)] += 1;
         }
         assert!(met.iter().all(|&count| count > 5_000), "{met:?}");

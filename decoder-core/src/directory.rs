@@ -3,7 +3,9 @@
 use crate::check::{Check, Section};
 use crate::crc32::crc32;
 use crate::error::{Part, Rule};
-use crate::header::{CONTENT_DICTIONARY, ENTRY_LENGTH, HEADER_LENGTH, Header, METHOD_SPARSE_ENSEMBLE, METHOD_SPARSE_TENSOR};
+use crate::header::{
+    CONTENT_DICTIONARY, ENTRY_LENGTH, HEADER_LENGTH, Header, METHOD_SPARSE_ENSEMBLE, METHOD_SPARSE_TENSOR,
+};
 
 /// Texts, units and frames for people and renderers (3.4).
 pub const METADATA: u32 = 0x0001;
@@ -44,11 +46,22 @@ enum Call {
 pub(crate) fn read_entry(word_at: impl Fn(u32) -> u32, index: u32) -> Section {
     let entry = HEADER_LENGTH.wrapping_add(index.wrapping_mul(ENTRY_LENGTH));
     let head = word_at(entry);
-    Section { kind: head & 0xffff, instance: head >> 16, offset: word_at(entry.wrapping_add(4)), length: word_at(entry.wrapping_add(8)), entry }
+    Section {
+        kind: head & 0xffff,
+        instance: head >> 16,
+        offset: word_at(entry.wrapping_add(4)),
+        length: word_at(entry.wrapping_add(8)),
+        entry,
+    }
 }
 
 /// The section of a kind and instance, by a directory that was checked.
-pub(crate) fn find_section(check: &Check<'_, '_>, header: &Header, kind: u32, instance: u32) -> Option<Section> {
+pub(crate) fn find_section(
+    check: &Check<'_, '_>,
+    header: &Header,
+    kind: u32,
+    instance: u32,
+) -> Option<Section> {
     find_in(|offset| check.word_at(offset), header.section_count, kind, instance)
 }
 
@@ -70,7 +83,21 @@ pub(crate) fn find_in(word_at: impl Fn(u32) -> u32, count: u32, kind: u32, insta
 
 /// Whether a kind belongs to the critical ones of this version.
 fn is_known(kind: u32) -> bool {
-    matches!(kind, METADATA | EXTERNAL | DIRECTIONS | MEANS | SCALES | ANGULAR | SPATIAL | ATOMS | COEFFICIENTS | LIGHT_ATOMS | FIBRES | LISTS)
+    matches!(
+        kind,
+        METADATA
+            | EXTERNAL
+            | DIRECTIONS
+            | MEANS
+            | SCALES
+            | ANGULAR
+            | SPATIAL
+            | ATOMS
+            | COEFFICIENTS
+            | LIGHT_ATOMS
+            | FIBRES
+            | LISTS
+    )
 }
 
 /// What the header says of a section of a known kind.
@@ -78,7 +105,10 @@ fn called_for(header: &Header, external: bool, kind: u32, instance: u32) -> Call
     let in_dictionary = header.content == CONTENT_DICTIONARY;
     let state = header.states.get(instance as usize).copied().unwrap_or(0);
     let when = |holds: bool, call: Call| if holds { call } else { Call::Foreign };
-    let (of_ensemble, of_tensor) = (matches!(kind, ANGULAR | SPATIAL | ATOMS | COEFFICIENTS), matches!(kind, LIGHT_ATOMS | FIBRES | LISTS));
+    let (of_ensemble, of_tensor) = (
+        matches!(kind, ANGULAR | SPATIAL | ATOMS | COEFFICIENTS),
+        matches!(kind, LIGHT_ATOMS | FIBRES | LISTS),
+    );
     let textured = header.has_texture();
     match kind {
         _ if of_ensemble && header.method != METHOD_SPARSE_ENSEMBLE => Call::Foreign,
@@ -107,12 +137,21 @@ fn called_for(header: &Header, external: bool, kind: u32, instance: u32) -> Call
         ATOMS => when(state == 2, Call::Required),
         COEFFICIENTS => {
             let (level, layer, channel) = (instance >> 8, (instance >> 4) & 0xf, instance & 0xf);
-            when(level < header.level_count && layer < header.layer_count && channel < 3 && header.is_full(channel), Call::Required)
+            when(
+                level < header.level_count
+                    && layer < header.layer_count
+                    && channel < 3
+                    && header.is_full(channel),
+                Call::Required,
+            )
         }
         LIGHT_ATOMS | FIBRES => when(instance == 0 && textured && !external, Call::Required),
         LISTS => {
             let (level, layer, rest) = (instance >> 8, (instance >> 4) & 0xf, instance & 0xf);
-            when(level < header.level_count && layer < header.layer_count && rest == 0 && textured, Call::Required)
+            when(
+                level < header.level_count && layer < header.layer_count && rest == 0 && textured,
+                Call::Required,
+            )
         }
         _ => Call::Allowed,
     }
@@ -174,10 +213,12 @@ fn check_calls(check: &mut Check<'_, '_>, header: &Header) -> bool {
     let external = find_section(check, header, EXTERNAL, 0).is_some();
     let mut sound = true;
     let mut require = |check: &mut Check<'_, '_>, kind: u32, instance: u32| {
-        let missing = called_for(header, external, kind, instance) == Call::Required && find_section(check, header, kind, instance).is_none();
+        let missing = called_for(header, external, kind, instance) == Call::Required
+            && find_section(check, header, kind, instance).is_none();
         sound &= check.ensure(!missing, Rule::SectionMissing, HEADER_LENGTH, kind | instance << 16);
     };
-    for kind in [METADATA, EXTERNAL, DIRECTIONS, MEANS, SCALES, ANGULAR, SPATIAL, ATOMS, LIGHT_ATOMS, FIBRES] {
+    for kind in [METADATA, EXTERNAL, DIRECTIONS, MEANS, SCALES, ANGULAR, SPATIAL, ATOMS, LIGHT_ATOMS, FIBRES]
+    {
         for instance in 0..3 {
             require(check, kind, instance);
         }
@@ -194,7 +235,8 @@ fn check_calls(check: &mut Check<'_, '_>, header: &Header) -> bool {
         let section = read_entry(|offset| check.word_at(offset), index);
         if section.kind < OPTIONAL {
             let foreign = called_for(header, external, section.kind, section.instance) == Call::Foreign;
-            sound &= check.ensure(!foreign, Rule::SectionForeign, section.entry, check.word_at(section.entry));
+            sound &=
+                check.ensure(!foreign, Rule::SectionForeign, section.entry, check.word_at(section.entry));
         }
     }
     sound && !check.stopped && (check.part == Part::File || header.content == CONTENT_DICTIONARY)

@@ -39,7 +39,13 @@ pub struct Record {
 }
 
 /// First word of the coefficients of a level, layer and channel, by the directory (10.3-1).
-pub fn coefficients_start(words: Words<'_>, material: &Material, channel: Channel, level: u32, layer: u32) -> u32 {
+pub fn coefficients_start(
+    words: Words<'_>,
+    material: &Material,
+    channel: Channel,
+    level: u32,
+    layer: u32,
+) -> u32 {
     let layers = level.wrapping_mul(material.layer_count).wrapping_add(layer);
     let rank = layers.wrapping_mul(material.full_count).wrapping_add(channel.full_rank);
     let entry = material.coefficient_entry.wrapping_add(rank.wrapping_mul(4));
@@ -61,7 +67,11 @@ pub fn read_record(words: Words<'_>, start: u32, block: u32) -> Record {
     let dictionary = low_part(window >> count_bits, dictionary_bits);
     let shift = low_part(window >> count_bits.wrapping_add(dictionary_bits), SHIFT_BITS);
     let low_bits = (window >> count_bits.wrapping_add(dictionary_bits).wrapping_add(SHIFT_BITS)) & 0xf;
-    let fields_bit = bit.wrapping_add(count_bits).wrapping_add(dictionary_bits).wrapping_add(SHIFT_BITS).wrapping_add(LOW_BITS_BITS);
+    let fields_bit = bit
+        .wrapping_add(count_bits)
+        .wrapping_add(dictionary_bits)
+        .wrapping_add(SHIFT_BITS)
+        .wrapping_add(LOW_BITS_BITS);
     let highs_bit = fields_bit.wrapping_add(count.wrapping_mul(low_bits.wrapping_add(value_bits)));
     Record { stream, value_bits, count, dictionary, shift, low_bits, fields_bit, highs_bit }
 }
@@ -81,9 +91,12 @@ pub fn dequantise(quantiser: u32, value: u32, value_bits: u32) -> i32 {
 /// One column of three rows of a factor by their weights, Q15 (10.6-1).
 #[inline(always)]
 pub fn blend_column(words: Words<'_>, table: u32, row_words: u32, taps: Taps, column: u32) -> i32 {
-    let a = packed_i16(words, table.wrapping_add(taps.a.wrapping_mul(row_words)), column).wrapping_mul(taps.weight_a_q15);
-    let b = packed_i16(words, table.wrapping_add(taps.b.wrapping_mul(row_words)), column).wrapping_mul(taps.weight_b_q15);
-    let c = packed_i16(words, table.wrapping_add(taps.c.wrapping_mul(row_words)), column).wrapping_mul(taps.weight_c_q15);
+    let a = packed_i16(words, table.wrapping_add(taps.a.wrapping_mul(row_words)), column)
+        .wrapping_mul(taps.weight_a_q15);
+    let b = packed_i16(words, table.wrapping_add(taps.b.wrapping_mul(row_words)), column)
+        .wrapping_mul(taps.weight_b_q15);
+    let c = packed_i16(words, table.wrapping_add(taps.c.wrapping_mul(row_words)), column)
+        .wrapping_mul(taps.weight_c_q15);
     // 10.6-1: the sum is exact, within 2^30; one rounding.
     a.wrapping_add(b).wrapping_add(c).wrapping_add(HALF_Q15) >> 15
 }
@@ -91,14 +104,24 @@ pub fn blend_column(words: Words<'_>, table: u32, row_words: u32, taps: Taps, co
 /// One column of two rows of a spatial factor by their weights, Q15 (10.6-2).
 #[inline(always)]
 pub fn blend_span(words: Words<'_>, table: u32, row_words: u32, span: Span, column: u32) -> i32 {
-    let a = packed_i16(words, table.wrapping_add(span.row_a.wrapping_mul(row_words)), column).wrapping_mul(span.weight_a_q15);
-    let b = packed_i16(words, table.wrapping_add(span.row_b.wrapping_mul(row_words)), column).wrapping_mul(span.weight_b_q15);
+    let a = packed_i16(words, table.wrapping_add(span.row_a.wrapping_mul(row_words)), column)
+        .wrapping_mul(span.weight_a_q15);
+    let b = packed_i16(words, table.wrapping_add(span.row_b.wrapping_mul(row_words)), column)
+        .wrapping_mul(span.weight_b_q15);
     // 10.6-2: the sum is exact, within 2^30; one rounding.
     a.wrapping_add(b).wrapping_add(HALF_Q15) >> 15
 }
 
 /// What one record adds to the texture of a channel, Q20 (10.7).
-pub fn record_q20(words: Words<'_>, channel: Channel, record: Record, x: Span, y: Span, light: Taps, view: Taps) -> i32 {
+pub fn record_q20(
+    words: Words<'_>,
+    channel: Channel,
+    record: Record,
+    x: Span,
+    y: Span,
+    light: Taps,
+    view: Taps,
+) -> i32 {
     // 10.1-3, 10.2-2, 10.5-2: the tables of the record's dictionary.
     let angular_start = channel.angular_start;
     let angular = angular_start.wrapping_add(2).wrapping_add(record.dictionary.wrapping_mul(4));
@@ -113,7 +136,10 @@ pub fn record_q20(words: Words<'_>, channel: Channel, record: Record, x: Span, y
     let x_table = spatial_start.wrapping_add(word(words, spatial.wrapping_add(2)));
     let y_table = spatial_start.wrapping_add(word(words, spatial.wrapping_add(3)));
     let atoms_start = channel.atoms_start;
-    let atoms = atoms_start.wrapping_add(word(words, atoms_start.wrapping_add(3).wrapping_add(record.dictionary.wrapping_mul(2))));
+    let atoms = atoms_start.wrapping_add(word(
+        words,
+        atoms_start.wrapping_add(3).wrapping_add(record.dictionary.wrapping_mul(2)),
+    ));
 
     let field_bits = record.low_bits.wrapping_add(record.value_bits);
     let mut total = 0i32;
@@ -140,7 +166,8 @@ pub fn record_q20(words: Words<'_>, channel: Channel, record: Record, x: Span, y
         high = high.wrapping_add(zeros);
         bit = bit.wrapping_add(zeros).wrapping_add(1);
         // 10.4-5: low part and value stand side by side at a fixed distance.
-        let field = bit_window(words, record.stream, record.fields_bit.wrapping_add(index.wrapping_mul(field_bits)));
+        let field =
+            bit_window(words, record.stream, record.fields_bit.wrapping_add(index.wrapping_mul(field_bits)));
         let position = (high << record.low_bits) | low_part(field, record.low_bits);
         let value = low_part(field >> record.low_bits, record.value_bits);
         let atom = word(words, atoms.wrapping_add(position.wrapping_mul(2)));
@@ -151,12 +178,14 @@ pub fn record_q20(words: Words<'_>, channel: Channel, record: Record, x: Span, y
         let next_x = (atom >> 24) & 0xf;
         let next_y = atom >> 28;
         if next_x != column_x || next_y != column_y {
-            sum_y = sum_y.wrapping_add(multiply_q15(sum_xy, blend_span(words, x_table, x_row_words, x, column_x)));
+            sum_y = sum_y
+                .wrapping_add(multiply_q15(sum_xy, blend_span(words, x_table, x_row_words, x, column_x)));
             sum_xy = 0;
             column_x = next_x;
         }
         if next_y != column_y {
-            total = total.wrapping_add(multiply_q15(sum_y, blend_span(words, y_table, y_row_words, y, column_y)));
+            total =
+                total.wrapping_add(multiply_q15(sum_y, blend_span(words, y_table, y_row_words, y, column_y)));
             sum_y = 0;
             column_y = next_y;
         }
@@ -183,7 +212,16 @@ pub fn record_q20(words: Words<'_>, channel: Channel, record: Record, x: Span, y
 }
 
 /// The texture of one block, all layers, Q20 (10.7-5).
-pub fn block_q20(words: Words<'_>, material: &Material, channel: Channel, level: u32, x: Span, y: Span, light: Taps, view: Taps) -> i32 {
+pub fn block_q20(
+    words: Words<'_>,
+    material: &Material,
+    channel: Channel,
+    level: u32,
+    x: Span,
+    y: Span,
+    light: Taps,
+    view: Taps,
+) -> i32 {
     let blocks_x = block_count(material, level_size(material.width, level));
     let block = y.block.wrapping_mul(blocks_x).wrapping_add(x.block);
     let mut sum = 0i32;
@@ -201,7 +239,16 @@ pub fn block_q20(words: Words<'_>, material: &Material, channel: Channel, level:
 }
 
 /// The texture of a channel between texels: the sum over one, two or four blocks, Q20 (10.7-6).
-pub fn texture_q20(words: Words<'_>, material: &Material, channel: Channel, level: u32, x: Axis, y: Axis, light: Taps, view: Taps) -> i32 {
+pub fn texture_q20(
+    words: Words<'_>,
+    material: &Material,
+    channel: Channel,
+    level: u32,
+    x: Axis,
+    y: Axis,
+    light: Taps,
+    view: Taps,
+) -> i32 {
     let mut sum = 0i32;
     let mut corner = 0u32;
     // 10.7-6: the weights are in the rows, so the blocks only add.

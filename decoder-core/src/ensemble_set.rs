@@ -25,18 +25,30 @@ pub const LOW_BITS_LIMIT: u32 = 12;
 pub(crate) fn check_ensemble_dictionary(check: &mut Check<'_, '_>, header: &Header) -> Option<()> {
     for c in 0..3 {
         if let Some(section) = find_section(check, header, ANGULAR, c) {
-            let angular = check_factors(check, section, header.light_count, header.view_count, ANGULAR_COLUMN_LIMIT)?;
+            let angular =
+                check_factors(check, section, header.light_count, header.view_count, ANGULAR_COLUMN_LIMIT)?;
             if let Some(section) = find_section(check, header, SPATIAL, c) {
                 let spatial = check_factors(check, section, header.edge, header.edge, header.edge)?;
-                check.ensure(spatial.count == angular.count, Rule::SpatialCounts, section.offset, spatial.count);
+                check.ensure(
+                    spatial.count == angular.count,
+                    Rule::SpatialCounts,
+                    section.offset,
+                    spatial.count,
+                );
             }
         }
     }
     Some(())
 }
 
-/// Walks chapter 10 of a material, but for its statement of cost; gives the largest operations of a level's textures.
-pub(crate) fn check_ensemble(check: &mut Check<'_, '_>, header: &Header, external: Option<&Header>, material: &mut Material) -> Option<u64> {
+/// Walks chapter 10 of a material, but for its statement of cost; gives the largest operations of a level's
+/// textures.
+pub(crate) fn check_ensemble(
+    check: &mut Check<'_, '_>,
+    header: &Header,
+    external: Option<&Header>,
+    material: &mut Material,
+) -> Option<u64> {
     let mut atoms = [None::<Section>; 3];
     let mut spatial_of = [None::<Factors>; 3];
     let mut angular_of = [None::<Factors>; 3];
@@ -56,7 +68,9 @@ pub(crate) fn check_ensemble(check: &mut Check<'_, '_>, header: &Header, externa
             (None, None) => return None,
         });
     }
-    for (c, ((angular, spatial), slot)) in (0u32..).zip(angular_of.iter().zip(&spatial_of).zip(atoms.iter_mut())) {
+    for (c, ((angular, spatial), slot)) in
+        (0u32..).zip(angular_of.iter().zip(&spatial_of).zip(atoms.iter_mut()))
+    {
         let (Some(angular), Some(spatial)) = (*angular, *spatial) else { continue };
         let section = find_section(check, header, ATOMS, c)?;
         let spatial_at = find_section(check, header, SPATIAL, c).unwrap_or(section).offset;
@@ -98,7 +112,12 @@ pub(crate) fn check_ensemble(check: &mut Check<'_, '_>, header: &Header, externa
 }
 
 /// Factors of the external dictionary, which was checked with its own file.
-fn factors_in_dictionary(check: &mut Check<'_, '_>, other: &Header, kind: u32, channel: u32) -> Option<Factors> {
+fn factors_in_dictionary(
+    check: &mut Check<'_, '_>,
+    other: &Header,
+    kind: u32,
+    channel: u32,
+) -> Option<Factors> {
     check.in_dictionary(|inner| {
         let start = inner.section_start(find_section(inner, other, kind, channel)?);
         Some(Factors { start, count: word(inner.words, start) })
@@ -127,14 +146,21 @@ pub(crate) fn columns(words: Words<'_>, start: u32, k: u32) -> (u32, u32) {
 }
 
 /// Walks 10.1 for the angular factors (`first_rows` lights, `second_rows` views) or 10.2 for the spatial.
-pub(crate) fn check_factors(check: &mut Check<'_, '_>, section: Section, first_rows: u32, second_rows: u32, limit: u32) -> Option<Factors> {
+pub(crate) fn check_factors(
+    check: &mut Check<'_, '_>,
+    section: Section,
+    first_rows: u32,
+    second_rows: u32,
+    limit: u32,
+) -> Option<Factors> {
     let offset = section.offset;
     if !check.ensure(section.length >= 8, Rule::FactorLength, offset, section.length) {
         return None;
     }
     let count = check.word_at(offset);
     let reserved = check.word_at(offset + 4);
-    let counted = (1..=DICTIONARY_LIMIT).contains(&count) && section.length >= 8 + count.min(DICTIONARY_LIMIT) * 16;
+    let counted =
+        (1..=DICTIONARY_LIMIT).contains(&count) && section.length >= 8 + count.min(DICTIONARY_LIMIT) * 16;
     if !check.ensure(counted, Rule::FactorCounts, offset, count) {
         return None;
     }
@@ -174,7 +200,12 @@ pub(crate) fn check_factors(check: &mut Check<'_, '_>, section: Section, first_r
 }
 
 /// Walks 10.5. `false` if the records cannot be held against it.
-pub(crate) fn check_atoms(check: &mut Check<'_, '_>, section: Section, angular: Factors, spatial: Factors) -> bool {
+pub(crate) fn check_atoms(
+    check: &mut Check<'_, '_>,
+    section: Section,
+    angular: Factors,
+    spatial: Factors,
+) -> bool {
     let count = angular.count;
     let offset = section.offset;
     let head = 8 + count * 8;
@@ -205,7 +236,10 @@ pub(crate) fn check_atoms(check: &mut Check<'_, '_>, section: Section, angular: 
         for i in 0..atoms {
             let at = offset + start * 4 + i * 8;
             let (atom, quantiser) = (check.word_at(at), check.word_at(at + 4));
-            let named = (atom >> 4) & 0x3ff < views && (atom >> 14) & 0x3ff < lights && (atom >> 24) & 0xf < xs && atom >> 28 < ys;
+            let named = (atom >> 4) & 0x3ff < views
+                && (atom >> 14) & 0x3ff < lights
+                && (atom >> 24) & 0xf < xs
+                && atom >> 28 < ys;
             sound &= check.ensure(named, Rule::AtomColumn, at, atom);
             sound &= check.ensure(before.is_none_or(|before| before < atom >> 4), Rule::AtomOrder, at, atom);
             before = Some(atom >> 4);
@@ -230,14 +264,21 @@ struct Stream<'a> {
 }
 
 /// Walks 10.3, 10.4 and 10.7-7; gives the largest count of a record.
-pub(crate) fn check_coefficients(check: &mut Check<'_, '_>, section: Section, header: &Header, level: u32, atoms: Section) -> Option<u32> {
+pub(crate) fn check_coefficients(
+    check: &mut Check<'_, '_>,
+    section: Section,
+    header: &Header,
+    level: u32,
+    atoms: Section,
+) -> Option<u32> {
     let offset = section.offset;
     if !check.ensure(section.length >= 16, Rule::CoefficientsLength, offset, section.length) {
         return None;
     }
     let widths = check.word_at(offset);
     let (value_bits, dictionary_bits, count_bits) = (widths & 0xff, (widths >> 8) & 0xff, widths >> 16);
-    let widths_good = (1..=16).contains(&value_bits) && dictionary_bits <= 8 && (1..=15).contains(&count_bits);
+    let widths_good =
+        (1..=16).contains(&value_bits) && dictionary_bits <= 8 && (1..=15).contains(&count_bits);
     if !check.ensure(widths_good, Rule::CoefficientsHeader, offset, widths) {
         return None;
     }
@@ -281,7 +322,13 @@ pub(crate) fn check_coefficients(check: &mut Check<'_, '_>, section: Section, he
 
 /// One record: its end and count, or nothing if what follows cannot be found.
 #[inline]
-fn check_record(check: &mut Check<'_, '_>, stream: &Stream<'_>, bit: u32, stream_offset: u32, atoms: Section) -> Option<(u32, u32)> {
+fn check_record(
+    check: &mut Check<'_, '_>,
+    stream: &Stream<'_>,
+    bit: u32,
+    stream_offset: u32,
+    atoms: Section,
+) -> Option<(u32, u32)> {
     let at = stream_offset + (bit >> 5) * 4;
     let head = window(stream.bytes, bit);
     let mask = |bits: u32| (1u64 << bits) - 1;
@@ -312,13 +359,22 @@ fn check_record(check: &mut Check<'_, '_>, stream: &Stream<'_>, bit: u32, stream
     let list = list.as_chunks::<8>().0;
     let list = list.get(..atom_count as usize).unwrap_or(&[]);
 
-    let layout = Layout { value_bits: stream.value_bits, low_bits, count, fields: fields as u32, highs: highs as u32, end: stream.bits };
+    let layout = Layout {
+        value_bits: stream.value_bits,
+        low_bits,
+        count,
+        fields: fields as u32,
+        highs: highs as u32,
+        end: stream.bits,
+    };
     let scan = scan_record(stream.bytes, list, layout);
     if let Some(position) = scan.beyond {
         check.find(Rule::RecordPositions, at, position);
         return None;
     }
-    if !check.ensure(scan.count == count, Rule::RecordPlace, at, bit) || !check.ensure(scan.ascends, Rule::RecordPositions, at, bit) {
+    if !check.ensure(scan.count == count, Rule::RecordPlace, at, bit)
+        || !check.ensure(scan.ascends, Rule::RecordPositions, at, bit)
+    {
         return None;
     }
     let (sum, end) = (scan.sum, scan.end);
@@ -376,7 +432,8 @@ fn scan_record(bytes: &[u8], list: &[[u8; 8]], layout: Layout) -> Scan {
         field_bit += low_bits + value_bits;
         // 64 bits: a high part beyond all atoms must not wrap back to one.
         let position = (high as u64) << low_bits | (field & low_mask) as u64;
-        let Some(&[a, _, _, _, b0, b1, s0, s1]) = usize::try_from(position).ok().and_then(|at| list.get(at)) else {
+        let Some(&[a, _, _, _, b0, b1, s0, s1]) = usize::try_from(position).ok().and_then(|at| list.get(at))
+        else {
             beyond = Some(position as u32);
             break;
         };

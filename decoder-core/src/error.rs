@@ -176,7 +176,15 @@ impl fmt::Display for Finding {
         if self.part == Part::Dictionary {
             f.write_str("dictionary: ")?;
         }
-        write!(f, "{} at byte {}: {}; found {} ({:#x})", self.rule.id(), self.offset, self.rule.title(), self.found, self.found)
+        write!(
+            f,
+            "{} at byte {}: {}; found {} ({:#x})",
+            self.rule.id(),
+            self.offset,
+            self.rule.title(),
+            self.found,
+            self.found
+        )
     }
 }
 

@@ -93,7 +93,8 @@ pub fn exp2_q31(fraction_q20: u32) -> u32 {
 
 /// The binary32 nearest to `mantissa * 2^(exponent - 31)`, halves away from zero (2.4-1).
 ///
-/// Zero gives +0; what is below the smallest normal before rounding gives +0; results beyond the largest finite give it.
+/// Zero gives +0; what is below the smallest normal before rounding gives +0; results beyond the largest
+/// finite give it.
 pub fn assemble_binary32(mantissa: u32, exponent: i32) -> u32 {
     if mantissa == 0 {
         return 0;
@@ -141,10 +142,25 @@ mod tests {
     fn binary32_is_assembled_as_floats_are_rounded() {
         for exponent in -140..=140 {
             // None of them is halfway between two floats.
-            for mantissa in [1u32, 3, 0x7fff_ffff, 0x8000_0000, 0x8000_007f, 0x8000_0081, 0xffff_ff7f, 0xffff_ff81, u32::MAX] {
+            for mantissa in [
+                1u32,
+                3,
+                0x7fff_ffff,
+                0x8000_0000,
+                0x8000_007f,
+                0x8000_0081,
+                0xffff_ff7f,
+                0xffff_ff81,
+                u32::MAX,
+            ] {
                 let exact = f64::from(mantissa) * 2f64.powi(exponent - 31);
-                let expected = if exact < f64::from(f32::MIN_POSITIVE) { 0.0 } else { (exact as f32).min(f32::MAX) };
-                assert_eq!(f32::from_bits(assemble_binary32(mantissa, exponent)), expected, "{mantissa} * 2^({exponent} - 31)");
+                let expected =
+                    if exact < f64::from(f32::MIN_POSITIVE) { 0.0 } else { (exact as f32).min(f32::MAX) };
+                assert_eq!(
+                    f32::from_bits(assemble_binary32(mantissa, exponent)),
+                    expected,
+                    "{mantissa} * 2^({exponent} - 31)"
+                );
             }
         }
     }

@@ -95,7 +95,17 @@ impl Header {
             transfer: byte(15, 0),
             cosine_included: byte(15, 1),
             transfer_parameter: word(16),
-            matrix_q13: [entry(0), entry(1), entry(2), entry(3), entry(4), entry(5), entry(6), entry(7), entry(8)],
+            matrix_q13: [
+                entry(0),
+                entry(1),
+                entry(2),
+                entry(3),
+                entry(4),
+                entry(5),
+                entry(6),
+                entry(7),
+                entry(8),
+            ],
         }
     }
 }
@@ -107,7 +117,10 @@ pub(crate) fn check_header(check: &mut Check<'_, '_>, limits: &Limits) -> Option
         return None;
     }
     let head = [check.word_at(0), check.word_at(4)];
-    let magic = [u32::from_le_bytes([MAGIC[0], MAGIC[1], MAGIC[2], MAGIC[3]]), u32::from_le_bytes([MAGIC[4], MAGIC[5], MAGIC[6], MAGIC[7]])];
+    let magic = [
+        u32::from_le_bytes([MAGIC[0], MAGIC[1], MAGIC[2], MAGIC[3]]),
+        u32::from_le_bytes([MAGIC[4], MAGIC[5], MAGIC[6], MAGIC[7]]),
+    ];
     if head != magic {
         let second = head[0] == magic[0];
         check.find(Rule::Magic, if second { 4 } else { 0 }, head[second as usize]);
@@ -132,7 +145,8 @@ pub(crate) fn check_header(check: &mut Check<'_, '_>, limits: &Limits) -> Option
     let sum = crc32(crc32(0, fields), directory);
     check.ensure(sum == stated, Rule::HeaderChecksum, 124, stated);
     let known_content = header.content == CONTENT_MATERIAL || header.content == CONTENT_DICTIONARY;
-    let wanted = if check.part == Part::Dictionary { header.content == CONTENT_DICTIONARY } else { known_content };
+    let wanted =
+        if check.part == Part::Dictionary { header.content == CONTENT_DICTIONARY } else { known_content };
     let mut sound = check.ensure(wanted, Rule::Content, 16, header.content);
     let of_ensemble = cfg!(feature = "sparse-ensemble") && header.method == METHOD_SPARSE_ENSEMBLE;
     let of_tensor = cfg!(feature = "sparse-tensor") && header.method == METHOD_SPARSE_TENSOR;
@@ -146,7 +160,8 @@ pub(crate) fn check_header(check: &mut Check<'_, '_>, limits: &Limits) -> Option
     }
     let in_range = (1..=15).contains(&header.level_count);
     let larger = header.width.max(header.height).min(16_384);
-    let needed = header.level_count == 1 || in_range && level_size(larger, header.level_count.wrapping_sub(2)) > 1;
+    let needed =
+        header.level_count == 1 || in_range && level_size(larger, header.level_count.wrapping_sub(2)) > 1;
     sound &= check.ensure(in_range && needed, Rule::LevelCount, 48, header.level_count);
     // A sparse tensor has no blocks: each texel is one.
     let largest_edge = if header.method == METHOD_SPARSE_TENSOR { 1 } else { 16 };
@@ -166,9 +181,19 @@ pub(crate) fn check_header(check: &mut Check<'_, '_>, limits: &Limits) -> Option
     };
     check.ensure(parameter_good, Rule::TransferParameter, 64, parameter);
     for (n, &entry) in (0u32..).zip(&header.matrix_q13) {
-        check.ensure(entry != -32768, Rule::ColourMatrix, 68u32.wrapping_add(n.wrapping_mul(2)), entry as u32);
+        check.ensure(
+            entry != -32768,
+            Rule::ColourMatrix,
+            68u32.wrapping_add(n.wrapping_mul(2)),
+            entry as u32,
+        );
     }
-    for (offset, unused) in [(54, check.word_at(52) >> 16), (59, check.word_at(56) >> 24), (62, check.word_at(60) >> 16), (86, check.word_at(84) >> 16)] {
+    for (offset, unused) in [
+        (54, check.word_at(52) >> 16),
+        (59, check.word_at(56) >> 24),
+        (62, check.word_at(60) >> 16),
+        (86, check.word_at(84) >> 16),
+    ] {
         check.ensure(unused == 0, Rule::HeaderReserved, offset, unused);
     }
     for index in 22u32..31 {
@@ -176,7 +201,13 @@ pub(crate) fn check_header(check: &mut Check<'_, '_>, limits: &Limits) -> Option
         check.ensure(found == 0, Rule::HeaderReserved, index.wrapping_mul(4), found);
     }
     if header.content == CONTENT_DICTIONARY {
-        let plain = [(28, 0, header.operations), (32, 1, header.width), (36, 1, header.height), (48, 1, header.level_count), (53, 1, header.layer_count)];
+        let plain = [
+            (28, 0, header.operations),
+            (32, 1, header.width),
+            (36, 1, header.height),
+            (48, 1, header.level_count),
+            (53, 1, header.layer_count),
+        ];
         for (offset, wanted, found) in plain {
             check.ensure(found == wanted, Rule::DictionaryHeader, offset, found);
         }

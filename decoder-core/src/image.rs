@@ -33,9 +33,18 @@ struct Finish {
 impl Finish {
     fn of(selvedge: &Selvedge<'_>, channel: Channel, light: Taps, view: Taps) -> Finish {
         let (words, material) = (selvedge.words(), selvedge.material());
-        let mean = if channel.state == CHANNEL_MISSING { 0 } else { mean_q20(words, material, channel, light, view) };
+        let mean = if channel.state == CHANNEL_MISSING {
+            0
+        } else {
+            mean_q20(words, material, channel, light, view)
+        };
         let scaled = channel.scale_start != 0;
-        let scale = scaled.then(|| (scale_q15(words, material, channel, light, view), word(words, channel.scale_start.wrapping_add(1))));
+        let scale = scaled.then(|| {
+            (
+                scale_q15(words, material, channel, light, view),
+                word(words, channel.scale_start.wrapping_add(1)),
+            )
+        });
         Finish { state: channel.state, mean, scale }
     }
 
@@ -76,11 +85,12 @@ impl Selvedge<'_> {
 
     /// Channel values, Q20, of every texel of a level: `[height, width]`, row-major.
     ///
-    /// At level 0 each value equals that of [`Selvedge::point_values`] where the directions are sample directions.
-    /// Levels and channels beyond the last are the last.
+    /// At level 0 each value equals that of [`Selvedge::point_values`] where the directions are sample
+    /// directions. Levels and channels beyond the last are the last.
     ///
     /// # Errors
-    /// If `out` has fewer than width x height elements or `scratch` fewer than [`Selvedge::image_scratch_len`].
+    /// If `out` has fewer than width x height elements or `scratch` fewer than
+    /// [`Selvedge::image_scratch_len`].
     pub fn decode_channel(
         &self,
         channel: usize,
@@ -114,7 +124,14 @@ impl Selvedge<'_> {
     ///
     /// # Errors
     /// As [`Selvedge::decode_channel`].
-    pub fn decode_image(&self, level: u32, light: Direction, view: Direction, scratch: &mut [i32], out: &mut [Rgb]) -> Result<(), BufferTooSmall> {
+    pub fn decode_image(
+        &self,
+        level: u32,
+        light: Direction,
+        view: Direction,
+        scratch: &mut [i32],
+        out: &mut [Rgb],
+    ) -> Result<(), BufferTooSmall> {
         let texels = self.image_buffers(level, scratch.len(), out.len())?;
         let (light, view) = (self.locate_light(light), self.locate_view(view));
         let out = out.get_mut(..texels).unwrap_or(&mut []);
@@ -169,15 +186,33 @@ impl Selvedge<'_> {
     }
 
     /// The channel values of every texel of a sparse tensor.
-    fn tensor_image(&self, level: u32, light: Taps, view: Taps, scratch: &mut [i32], mut put: impl FnMut(usize, [i32; 3])) {
+    fn tensor_image(
+        &self,
+        level: u32,
+        light: Taps,
+        view: Taps,
+        scratch: &mut [i32],
+        mut put: impl FnMut(usize, [i32; 3]),
+    ) {
         let level = level.min(self.material().level_count.wrapping_sub(1));
         let [f0, f1, f2] = self.material().channels.map(|channel| Finish::of(self, channel, light, view));
-        tensor_paths::image_textures(self, level, light, view, scratch, |at, [t0, t1, t2]| put(at, [f0.value(t0), f1.value(t1), f2.value(t2)]));
+        tensor_paths::image_textures(self, level, light, view, scratch, |at, [t0, t1, t2]| {
+            put(at, [f0.value(t0), f1.value(t1), f2.value(t2)])
+        });
     }
 
-    /// Every texel of one channel of a sparse ensemble, block by block; of a channel without texture, of any method.
+    /// Every texel of one channel of a sparse ensemble, block by block; of a channel without texture, of any
+    /// method.
     #[inline(always)]
-    fn channel_image(&self, number: usize, level: u32, light: Taps, view: Taps, scratch: &mut [i32], mut put: impl FnMut(usize, i32)) {
+    fn channel_image(
+        &self,
+        number: usize,
+        level: u32,
+        light: Taps,
+        view: Taps,
+        scratch: &mut [i32],
+        mut put: impl FnMut(usize, i32),
+    ) {
         let (words, material) = (self.words(), self.material());
         let level = level.min(material.level_count.wrapping_sub(1));
         let [width, height] = self.image_size(level);
@@ -217,11 +252,14 @@ impl Selvedge<'_> {
         let words = self.words();
         let mut slots = out.iter_mut();
         for k in 0..word(words, channel.atoms_start) {
-            let columns = |which: u32, taps: Taps| Blend::rows(Table::new(words, channel.angular_start, k, which), taps);
+            let columns = |which: u32, taps: Taps| {
+                Blend::rows(Table::new(words, channel.angular_start, k, which), taps)
+            };
             let (u_light, u_view) = (columns(0, light), columns(1, view));
             for (&[a0, a1, a2, a3, ..], slot) in atoms_of(words, channel, k).iter().zip(&mut slots) {
                 let atom = u32::from_le_bytes([a0, a1, a2, a3]);
-                let product = u_light.column((atom >> 14) & 0x3ff).wrapping_mul(u_view.column((atom >> 4) & 0x3ff));
+                let product =
+                    u_light.column((atom >> 14) & 0x3ff).wrapping_mul(u_view.column((atom >> 4) & 0x3ff));
                 *slot = product.wrapping_add(HALF_Q15) >> 15;
             }
         }

@@ -67,8 +67,19 @@ pub fn scale_texture(texture: i32, scale: i32, shift: u32) -> i32 {
     clamp_magnitude(multiply_q15(texture, scale), VALUE_BOUND >> shift) << shift
 }
 
-/// The value of a channel at one level, Q20 (8.3); `given` is its texture where the method gives those of all channels at once.
-pub fn channel_q20(words: Words<'_>, material: &Material, channel: Channel, given: i32, level: u32, x: Axis, y: Axis, light: Taps, view: Taps) -> i32 {
+/// The value of a channel at one level, Q20 (8.3); `given` is its texture where the method gives those of all
+/// channels at once.
+pub fn channel_q20(
+    words: Words<'_>,
+    material: &Material,
+    channel: Channel,
+    given: i32,
+    level: u32,
+    x: Axis,
+    y: Axis,
+    light: Taps,
+    view: Taps,
+) -> i32 {
     // 8.3-1: a missing channel is zero.
     if channel.state == CHANNEL_MISSING {
         return 0;
@@ -105,7 +116,15 @@ pub fn channel_of(material: &Material, number: u32) -> Channel {
 }
 
 /// The values of all channels at one level (8.3).
-pub fn level_values(words: Words<'_>, material: &Material, level: u32, x: Axis, y: Axis, light: Taps, view: Taps) -> Values {
+pub fn level_values(
+    words: Words<'_>,
+    material: &Material,
+    level: u32,
+    x: Axis,
+    y: Axis,
+    light: Taps,
+    view: Taps,
+) -> Values {
     let mut values = Values { c0: 0, c1: 0, c2: 0 };
     // 8.3-3: a sparse tensor gives the textures of all channels at once.
     if material.method == METHOD_SPARSE_TENSOR && material.full_count != 0 {
@@ -120,7 +139,8 @@ pub fn level_values(words: Words<'_>, material: &Material, level: u32, x: Axis, 
         if number == 2 {
             given = values.c2;
         }
-        let value = channel_q20(words, material, channel_of(material, number), given, level, x, y, light, view);
+        let value =
+            channel_q20(words, material, channel_of(material, number), given, level, x, y, light, view);
         if number == 0 {
             values.c0 = value;
         }
@@ -135,11 +155,29 @@ pub fn level_values(words: Words<'_>, material: &Material, level: u32, x: Axis, 
 }
 
 /// Values between two texels of each axis of one level (8.4).
-pub fn filtered_values(words: Words<'_>, material: &Material, level: u32, u_q32: u32, v_q32: u32, light: Taps, view: Taps) -> Values {
+pub fn filtered_values(
+    words: Words<'_>,
+    material: &Material,
+    level: u32,
+    u_q32: u32,
+    v_q32: u32,
+    light: Taps,
+    view: Taps,
+) -> Values {
     // 8.4-4: a level beyond the last is the last.
     let inside = level.min(material.level_count.wrapping_sub(1));
-    let x = axis_at_position(material.edge, material.edge_reciprocal_q18, level_size(material.width, inside), u_q32);
-    let y = axis_at_position(material.edge, material.edge_reciprocal_q18, level_size(material.height, inside), v_q32);
+    let x = axis_at_position(
+        material.edge,
+        material.edge_reciprocal_q18,
+        level_size(material.width, inside),
+        u_q32,
+    );
+    let y = axis_at_position(
+        material.edge,
+        material.edge_reciprocal_q18,
+        level_size(material.height, inside),
+        v_q32,
+    );
     level_values(words, material, inside, x, y, light, view)
 }
 
@@ -150,7 +188,15 @@ pub fn between(from_value: i32, to_value: i32, fraction_q15: i32) -> i32 {
 }
 
 /// Values between two levels, the level in Q16 (9.2).
-pub fn trilinear_values(words: Words<'_>, material: &Material, level_q16: u32, u_q32: u32, v_q32: u32, light: Taps, view: Taps) -> Values {
+pub fn trilinear_values(
+    words: Words<'_>,
+    material: &Material,
+    level_q16: u32,
+    u_q32: u32,
+    v_q32: u32,
+    light: Taps,
+    view: Taps,
+) -> Values {
     // 9.2-1: beyond the last level lies the last level.
     let limited = level_q16.min(material.level_count.wrapping_sub(1) << 16);
     let level = limited >> 16;
@@ -167,7 +213,14 @@ pub fn trilinear_values(words: Words<'_>, material: &Material, level_q16: u32, u
 }
 
 /// Values of one texel of level 0 for one pair of sample directions (8.5).
-pub fn point_values(words: Words<'_>, material: &Material, texel_x: u32, texel_y: u32, light_index: u32, view_index: u32) -> Values {
+pub fn point_values(
+    words: Words<'_>,
+    material: &Material,
+    texel_x: u32,
+    texel_y: u32,
+    light_index: u32,
+    view_index: u32,
+) -> Values {
     // 8.5-1: an index beyond the end is moved to the last.
     let light = single_tap(light_index.min(material.light_count.wrapping_sub(1)));
     let view = single_tap(view_index.min(material.view_count.wrapping_sub(1)));
@@ -175,7 +228,14 @@ pub fn point_values(words: Words<'_>, material: &Material, texel_x: u32, texel_y
 }
 
 /// Values of one texel of level 0 for located directions (8.5).
-pub fn texel_values(words: Words<'_>, material: &Material, texel_x: u32, texel_y: u32, light: Taps, view: Taps) -> Values {
+pub fn texel_values(
+    words: Words<'_>,
+    material: &Material,
+    texel_x: u32,
+    texel_y: u32,
+    light: Taps,
+    view: Taps,
+) -> Values {
     let inside_x = texel_x.min(material.width.wrapping_sub(1));
     let inside_y = texel_y.min(material.height.wrapping_sub(1));
     let x = axis_at_texel(material.edge, material.edge_reciprocal_q18, inside_x);

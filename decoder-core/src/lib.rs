@@ -38,7 +38,11 @@
 #![no_std]
 #![forbid(unsafe_code)]
 #![allow(clippy::too_many_arguments, reason = "twins spell out every parameter, in the order of the kernel")]
-#![allow(clippy::manual_clamp, clippy::manual_range_contains, reason = "twins are written in the dialect that WGSL can say")]
+#![allow(
+    clippy::manual_clamp,
+    clippy::manual_range_contains,
+    reason = "twins are written in the dialect that WGSL can say"
+)]
 
 #[cfg(test)]
 extern crate std;

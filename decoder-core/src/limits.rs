@@ -5,8 +5,8 @@
 pub struct Limits {
     /// Bytes of the file, and of an external dictionary.
     pub bytes: u32,
-    /// Operations of a filtered sample: 32-bit multiplications of values, at worst. A sample between two levels
-    /// costs at most twice as much.
+    /// Operations of a filtered sample: 32-bit multiplications of values, at worst. A sample between two
+    /// levels costs at most twice as much.
     pub operations: u32,
     /// Texels of level 0: what whoever decodes an image has to have room for.
     pub texels: u32,

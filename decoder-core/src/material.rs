@@ -97,7 +97,17 @@ impl Material {
     /// The record's words in the order of its fields, for a kernel's table of materials.
     pub fn to_words(&self) -> [u32; MATERIAL_WORDS] {
         let Material { matrix_q13: m, channels, .. } = *self;
-        let [c0, c1, c2] = channels.map(|c| [c.state, c.mean_start, c.scale_start, c.full_rank, c.angular_start, c.spatial_start, c.atoms_start]);
+        let [c0, c1, c2] = channels.map(|c| {
+            [
+                c.state,
+                c.mean_start,
+                c.scale_start,
+                c.full_rank,
+                c.angular_start,
+                c.spatial_start,
+                c.atoms_start,
+            ]
+        });
         let head = [
             self.file_start,
             self.width,
@@ -112,10 +122,24 @@ impl Material {
             self.offset_mantissa_q31,
             self.exponent as u32,
         ];
-        let tail = [self.edge, self.edge_reciprocal_q18, self.layer_count, self.layer_limit, self.full_count, self.coefficient_entry];
+        let tail = [
+            self.edge,
+            self.edge_reciprocal_q18,
+            self.layer_count,
+            self.layer_limit,
+            self.full_count,
+            self.coefficient_entry,
+        ];
         let tensor = [self.method, self.light_atoms_start, self.fibres_start];
         let mut words = [0; MATERIAL_WORDS];
-        let fields = head.into_iter().chain(m.map(|entry| entry as u32)).chain(tail).chain(tensor).chain(c0).chain(c1).chain(c2);
+        let fields = head
+            .into_iter()
+            .chain(m.map(|entry| entry as u32))
+            .chain(tail)
+            .chain(tensor)
+            .chain(c0)
+            .chain(c1)
+            .chain(c2);
         words.iter_mut().zip(fields).for_each(|(word, field)| *word = field);
         words
     }

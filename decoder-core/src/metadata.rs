@@ -10,7 +10,8 @@ pub struct Metadata<'a> {
     pub texel_width_nm: u32,
     /// Height of a texel in nanometres, 0 if unknown.
     pub texel_height_nm: u32,
-    /// Axes of the directions: 0 unknown, 1 x to the right and y up in the image, 2 x to the right and y down.
+    /// Axes of the directions: 0 unknown, 1 x to the right and y up in the image, 2 x to the right and y
+    /// down.
     pub frame: u32,
     /// Where texel (0, 0) is: 0 unknown, 1 top left, 2 bottom left.
     pub image_origin: u32,
@@ -36,9 +37,11 @@ fn read_text(bytes: &[u8], at: usize) -> Option<(&[u8], &[u8], usize)> {
     Some((bytes.get(start..end)?, bytes.get(end..next)?, next))
 }
 
-/// Characters that are not seen, or that change how others are read, and that no text of a file may have (3.4-3).
+/// Characters that are not seen, or that change how others are read, and that no text of a file may have
+/// (3.4-3).
 pub fn is_invisible(c: char) -> bool {
-    c.is_control() || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')
+    c.is_control()
+        || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')
 }
 
 /// A string that can be shown as it is.
@@ -98,7 +101,8 @@ pub(crate) fn check_metadata(check: &mut Check<'_, '_>, section: Section) {
 pub(crate) fn check_external<'a>(check: &mut Check<'a, '_>, section: Section) -> Option<&'a [u8]> {
     let bytes = check.section_bytes(section);
     let tail_zero = bytes.get(36..).is_some_and(|tail| tail.iter().all(|&byte| byte == 0));
-    if !check.ensure(section.length == 48 && tail_zero, Rule::ExternalLength, section.offset, section.length) {
+    if !check.ensure(section.length == 48 && tail_zero, Rule::ExternalLength, section.offset, section.length)
+    {
         return None;
     }
     bytes.get(..32)

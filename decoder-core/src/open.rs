@@ -5,12 +5,17 @@ use crate::colour::{Rgb, Values};
 use crate::cost::{Shape, filtered_operations};
 use crate::direction::{Direction, Taps, sample_direction};
 use crate::direction_set::{check_directions, largest_candidates};
-use crate::directory::{DIRECTIONS, EXTERNAL, MEANS, METADATA, SCALES, SPATIAL, check_directory, find_in, find_section, read_entry};
+use crate::directory::{
+    DIRECTIONS, EXTERNAL, MEANS, METADATA, SCALES, SPATIAL, check_directory, find_in, find_section,
+    read_entry,
+};
 #[cfg(feature = "sparse-ensemble")]
 use crate::ensemble_set::{check_ensemble, check_ensemble_dictionary};
 use crate::error::{Finding, First, Part, Rule, Sink};
 use crate::header::{CONTENT_DICTIONARY, CONTENT_MATERIAL, Header, check_header};
-use crate::interpolation::{filtered_values, locate_light, locate_view, point_values, radiance, trilinear_values};
+use crate::interpolation::{
+    filtered_values, locate_light, locate_view, point_values, radiance, trilinear_values,
+};
 use crate::limits::Limits;
 #[cfg(feature = "sparse-tensor")]
 use crate::material::METHOD_SPARSE_TENSOR;
@@ -51,7 +56,11 @@ pub fn open<'a>(bytes: &'a [u8], limits: &Limits) -> Result<Selvedge<'a>, Findin
 ///
 /// # Errors
 /// As [`open`]; the dictionary is held to the same rules and to the digest that the material names.
-pub fn open_with<'a>(bytes: &'a [u8], dictionary: Option<&'a [u8]>, limits: &Limits) -> Result<Selvedge<'a>, Finding> {
+pub fn open_with<'a>(
+    bytes: &'a [u8],
+    dictionary: Option<&'a [u8]>,
+    limits: &Limits,
+) -> Result<Selvedge<'a>, Finding> {
     let mut first = First::default();
     let opened = check_material(bytes, dictionary, limits, &mut first);
     match (opened, first.0) {
@@ -62,8 +71,14 @@ pub fn open_with<'a>(bytes: &'a [u8], dictionary: Option<&'a [u8]>, limits: &Lim
     }
 }
 
-/// Opens a material as [`open_with`] does and tells every finding, not only the first: `Some` if there is none.
-pub fn open_telling<'a>(bytes: &'a [u8], dictionary: Option<&'a [u8]>, limits: &Limits, sink: &mut dyn Sink) -> Option<Selvedge<'a>> {
+/// Opens a material as [`open_with`] does and tells every finding, not only the first: `Some` if there is
+/// none.
+pub fn open_telling<'a>(
+    bytes: &'a [u8],
+    dictionary: Option<&'a [u8]>,
+    limits: &Limits,
+    sink: &mut dyn Sink,
+) -> Option<Selvedge<'a>> {
     check_material(bytes, dictionary, limits, sink)
 }
 
@@ -95,12 +110,19 @@ fn walk_dictionary(check: &mut Check<'_, '_>, limits: &Limits) -> Option<Header>
 }
 
 /// The checks of a material, in order. `None` if there was a finding.
-fn check_material<'a>(bytes: &'a [u8], dictionary: Option<&'a [u8]>, limits: &Limits, sink: &mut dyn Sink) -> Option<Selvedge<'a>> {
+fn check_material<'a>(
+    bytes: &'a [u8],
+    dictionary: Option<&'a [u8]>,
+    limits: &Limits,
+    sink: &mut dyn Sink,
+) -> Option<Selvedge<'a>> {
     let words = Words { file: bytes, dictionary: dictionary.unwrap_or(&[]) };
     let mut checker = Check::new(words, Part::File, sink);
     let check = &mut checker;
     let header = check_header(check, limits)?;
-    if !check.ensure(header.content == CONTENT_MATERIAL, Rule::Content, 16, header.content) || !check_directory(check, &header) {
+    if !check.ensure(header.content == CONTENT_MATERIAL, Rule::Content, 16, header.content)
+        || !check_directory(check, &header)
+    {
         return None;
     }
     check_metadata(check, find_section(check, &header, METADATA, 0)?);
@@ -137,15 +159,26 @@ fn check_material<'a>(bytes: &'a [u8], dictionary: Option<&'a [u8]>, limits: &Li
     }
     let sets = [light, view].map(|section| largest_candidates(check, section));
     let means = header.states.iter().filter(|&&state| state != 0).count() as u32;
-    let shape = Shape { candidates: sets.map(|set| set.0), hull_counts: sets.map(|set| set.1), means, scales: scaled };
+    let shape = Shape {
+        candidates: sets.map(|set| set.0),
+        hull_counts: sets.map(|set| set.1),
+        means,
+        scales: scaled,
+    };
     let operations = filtered_operations(shape, textures);
     check.ensure(operations == header.operations, Rule::StatedOperations, 28, header.operations);
     check.clean.then_some(Selvedge { words, header, material })
 }
 
-/// Walks the chapter of the material's method; a method that this build does not have was refused with the header.
+/// Walks the chapter of the material's method; a method that this build does not have was refused with the
+/// header.
 #[allow(unused_variables, reason = "a build may have no method")]
-fn check_method(check: &mut Check<'_, '_>, header: &Header, external: Option<&Header>, material: &mut Material) -> Option<u64> {
+fn check_method(
+    check: &mut Check<'_, '_>,
+    header: &Header,
+    external: Option<&Header>,
+    material: &mut Material,
+) -> Option<u64> {
     match header.method {
         #[cfg(feature = "sparse-ensemble")]
         METHOD_SPARSE_ENSEMBLE => check_ensemble(check, header, external, material),
@@ -168,7 +201,12 @@ fn check_method_dictionary(check: &mut Check<'_, '_>, header: &Header) -> Option
 }
 
 /// Walks 3.5. `Some(None)` is a material without an external dictionary.
-fn walk_external(check: &mut Check<'_, '_>, header: &Header, dictionary: Option<&[u8]>, limits: &Limits) -> Option<Option<Header>> {
+fn walk_external(
+    check: &mut Check<'_, '_>,
+    header: &Header,
+    dictionary: Option<&[u8]>,
+    limits: &Limits,
+) -> Option<Option<Header>> {
     let Some(section) = find_section(check, header, EXTERNAL, 0) else {
         return check.ensure(dictionary.is_none(), Rule::ExternalUnwanted, 0, 0).then_some(None);
     };
@@ -187,11 +225,17 @@ fn walk_external(check: &mut Check<'_, '_>, header: &Header, dictionary: Option<
     }
     let other = check.in_dictionary(|inner| walk_dictionary(inner, limits))?;
     let serves = (0..3).all(|c| !header.is_full(c) || other.is_full(c));
-    let fits = other.method == header.method && other.light_count == header.light_count && other.view_count == header.view_count && serves;
+    let fits = other.method == header.method
+        && other.light_count == header.light_count
+        && other.view_count == header.view_count
+        && serves;
     // Spatial factors that the material does not have must be there, and for its edge.
     let has_blocks = header.method == METHOD_SPARSE_ENSEMBLE;
-    let lacks = [0, 1, 2].map(|c| has_blocks && header.is_full(c) && find_section(check, header, SPATIAL, c).is_none());
-    let there = check.in_dictionary(|inner| (0u32..).zip(lacks).all(|(c, lacks)| !lacks || find_section(inner, &other, SPATIAL, c).is_some()));
+    let lacks = [0, 1, 2]
+        .map(|c| has_blocks && header.is_full(c) && find_section(check, header, SPATIAL, c).is_none());
+    let there = check.in_dictionary(|inner| {
+        (0u32..).zip(lacks).all(|(c, lacks)| !lacks || find_section(inner, &other, SPATIAL, c).is_some())
+    });
     let fits = fits && there && (!lacks.contains(&true) || other.edge == header.edge);
     check.ensure(fits, Rule::ExternalFit, section.offset, other.edge).then_some(Some(other))
 }
@@ -258,7 +302,8 @@ impl<'a> Selvedge<'a> {
         (0..self.header.section_count).map(|index| read_entry(|offset| word(self.words, offset >> 2), index))
     }
 
-    /// The same material, decoded only up to a quality layer: 1 for the first alone. Its digest is then that of the layers.
+    /// The same material, decoded only up to a quality layer: 1 for the first alone. Its digest is then that
+    /// of the layers.
     pub fn with_layers(mut self, layers: u32) -> Self {
         // Not `clamp`, which panics if its bounds cross.
         self.material.layer_limit = layers.min(self.header.layer_count).max(1);
@@ -269,7 +314,11 @@ impl<'a> Selvedge<'a> {
     /// dictionary, if there is one, from word `dictionary_start` on. Buffers end before word 2^31.
     pub fn material_at(&self, file_start: u32, dictionary_start: u32) -> Material {
         let place = |start: u32| {
-            if start < crate::words::DICTIONARY_START { start.wrapping_add(file_start) } else { (start & 0x7fff_ffff).wrapping_add(dictionary_start) }
+            if start < crate::words::DICTIONARY_START {
+                start.wrapping_add(file_start)
+            } else {
+                (start & 0x7fff_ffff).wrapping_add(dictionary_start)
+            }
         };
         let mut material = self.material;
         material.file_start = file_start;
@@ -283,7 +332,13 @@ impl<'a> Selvedge<'a> {
             }
         }
         for channel in &mut material.channels {
-            for start in [&mut channel.mean_start, &mut channel.scale_start, &mut channel.angular_start, &mut channel.spatial_start, &mut channel.atoms_start] {
+            for start in [
+                &mut channel.mean_start,
+                &mut channel.scale_start,
+                &mut channel.angular_start,
+                &mut channel.spatial_start,
+                &mut channel.atoms_start,
+            ] {
                 if *start != 0 {
                     *start = place(*start);
                 }
@@ -314,7 +369,8 @@ impl<'a> Selvedge<'a> {
         locate_view(self.words, &self.material, direction)
     }
 
-    /// Radiance of one texel of level 0 for one pair of sample directions (8.5). Indices beyond the end are moved to the last.
+    /// Radiance of one texel of level 0 for one pair of sample directions (8.5). Indices beyond the end are
+    /// moved to the last.
     pub fn point(&self, texel_x: u32, texel_y: u32, light_index: u32, view_index: u32) -> Rgb {
         let values = self.point_values(texel_x, texel_y, light_index, view_index);
         radiance(&self.material, values, crate::direction::single_tap(light_index))
@@ -325,7 +381,8 @@ impl<'a> Selvedge<'a> {
         point_values(self.words, &self.material, texel_x, texel_y, light_index, view_index)
     }
 
-    /// Radiance at any position and for any directions, at full resolution (8.4). `u` and `v` are u0.32 fractions of the image.
+    /// Radiance at any position and for any directions, at full resolution (8.4). `u` and `v` are u0.32
+    /// fractions of the image.
     pub fn filtered(&self, u_q32: u32, v_q32: u32, light: Direction, view: Direction) -> Rgb {
         let light = self.locate_light(light);
         radiance(&self.material, self.filtered_values(u_q32, v_q32, light, self.locate_view(view)), light)
@@ -337,9 +394,20 @@ impl<'a> Selvedge<'a> {
     }
 
     /// Radiance at any position, between two levels of detail (9.2). The level is in Q16: `0x18000` is 1.5.
-    pub fn trilinear(&self, level_q16: u32, u_q32: u32, v_q32: u32, light: Direction, view: Direction) -> Rgb {
+    pub fn trilinear(
+        &self,
+        level_q16: u32,
+        u_q32: u32,
+        v_q32: u32,
+        light: Direction,
+        view: Direction,
+    ) -> Rgb {
         let light = self.locate_light(light);
         let view = self.locate_view(view);
-        radiance(&self.material, trilinear_values(self.words, &self.material, level_q16, u_q32, v_q32, light, view), light)
+        radiance(
+            &self.material,
+            trilinear_values(self.words, &self.material, level_q16, u_q32, v_q32, light, view),
+            light,
+        )
     }
 }

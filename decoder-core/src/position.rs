@@ -124,7 +124,16 @@ mod tests {
 
     #[test]
     fn fractions_of_binary32_wrap() {
-        for (value, want) in [(0.25f32, 1u32 << 30), (1.25, 1 << 30), (-0.25, 3 << 30), (-7.75, 1 << 30), (0.0, 0), (1e30, 0), (f32::NAN, 0), (1e-30, 0)] {
+        for (value, want) in [
+            (0.25f32, 1u32 << 30),
+            (1.25, 1 << 30),
+            (-0.25, 3 << 30),
+            (-7.75, 1 << 30),
+            (0.0, 0),
+            (1e30, 0),
+            (f32::NAN, 0),
+            (1e-30, 0),
+        ] {
             assert_eq!(fraction_from_binary32(value.to_bits()), want, "{value}");
         }
         let mut state = 1u32;
@@ -156,7 +165,11 @@ mod tests {
             let size = 1 << exponent;
             for texel in (0..size).step_by(1.max(size as usize / 64)) {
                 let axis = axis_at_position(1, 1 << 18, size, (2 * texel + 1) << (31 - exponent));
-                assert_eq!((axis.first.block, axis.first.weight_a_q15), (texel, ONE_Q15), "{texel} of {size}");
+                assert_eq!(
+                    (axis.first.block, axis.first.weight_a_q15),
+                    (texel, ONE_Q15),
+                    "{texel} of {size}"
+                );
             }
         }
     }

@@ -19,7 +19,14 @@ pub(crate) struct Coefficient {
 }
 
 /// The record of a block in a layer.
-pub(crate) fn record_of(words: Words<'_>, material: &Material, channel: Channel, level: u32, layer: u32, block: u32) -> Record {
+pub(crate) fn record_of(
+    words: Words<'_>,
+    material: &Material,
+    channel: Channel,
+    level: u32,
+    layer: u32,
+    block: u32,
+) -> Record {
     read_record(words, coefficients_start(words, material, channel, level, layer), block)
 }
 
@@ -40,7 +47,12 @@ pub(crate) fn atoms_of<'a>(words: Words<'a>, channel: Channel, dictionary: u32) 
 
 /// Calls `each` for the coefficients of a record, in order.
 #[inline(always)]
-pub(crate) fn for_each_coefficient(words: Words<'_>, channel: Channel, record: &Record, mut each: impl FnMut(Coefficient)) {
+pub(crate) fn for_each_coefficient(
+    words: Words<'_>,
+    channel: Channel,
+    record: &Record,
+    mut each: impl FnMut(Coefficient),
+) {
     let stream = bytes_from(words, record.stream);
     let atoms = atoms_of(words, channel, record.dictionary);
     let field_bits = record.low_bits.wrapping_add(record.value_bits);
@@ -74,12 +86,18 @@ impl<'a> Table<'a> {
         let entry = start.wrapping_add(2).wrapping_add(dictionary.wrapping_mul(4));
         let columns = crate::words::word(words, entry.wrapping_add(which));
         let table = start.wrapping_add(crate::words::word(words, entry.wrapping_add(2).wrapping_add(which)));
-        Table { bytes: bytes_from(words, table), row_bytes: (columns.wrapping_add(1) >> 1).wrapping_mul(4) as usize }
+        Table {
+            bytes: bytes_from(words, table),
+            row_bytes: (columns.wrapping_add(1) >> 1).wrapping_mul(4) as usize,
+        }
     }
 
     /// The rows of a table of means or scales at `start`: one for each view, an entry for each light.
     pub fn of_pairs(words: Words<'a>, start: u32, light_count: u32) -> Table<'a> {
-        Table { bytes: bytes_from(words, start.wrapping_add(4)), row_bytes: (light_count.wrapping_add(1) >> 1).wrapping_mul(4) as usize }
+        Table {
+            bytes: bytes_from(words, start.wrapping_add(4)),
+            row_bytes: (light_count.wrapping_add(1) >> 1).wrapping_mul(4) as usize,
+        }
     }
 
     /// A row; its columns may run on into the next row, which no checked file asks for.
@@ -108,7 +126,9 @@ impl<'a> Blend<'a> {
     #[inline(always)]
     pub fn column(&self, column: u32) -> i32 {
         let [a, b, c] = self.rows;
-        let sum = entry(a, column).wrapping_mul(self.taps.weight_a_q15).wrapping_add(entry(b, column).wrapping_mul(self.taps.weight_b_q15));
+        let sum = entry(a, column)
+            .wrapping_mul(self.taps.weight_a_q15)
+            .wrapping_add(entry(b, column).wrapping_mul(self.taps.weight_b_q15));
         sum.wrapping_add(entry(c, column).wrapping_mul(self.taps.weight_c_q15)).wrapping_add(HALF_Q15) >> 15
     }
 }

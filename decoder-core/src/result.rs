@@ -85,7 +85,12 @@ impl Selvedge<'_> {
                     0 => {
                         let pick = |word: u32, count: u32| crate::fixed::product_high(word, count);
                         let (l, w) = (next(), next());
-                        self.point(pick(u, material.width), pick(v, material.height), pick(l, material.light_count), pick(w, material.view_count))
+                        self.point(
+                            pick(u, material.width),
+                            pick(v, material.height),
+                            pick(l, material.light_count),
+                            pick(w, material.view_count),
+                        )
                     }
                     // 11.2-5: filtered samples.
                     1 => {

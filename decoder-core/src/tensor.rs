@@ -65,7 +65,9 @@ pub fn list_bits(index_bits: u32, value_bits: u32, atom_count: u32, count: u32) 
     if count == 0 {
         return 0;
     }
-    count.wrapping_mul(low_bits.wrapping_add(value_bits).wrapping_add(1)).wrapping_add(atom_count.wrapping_sub(1) >> low_bits)
+    count
+        .wrapping_mul(low_bits.wrapping_add(value_bits).wrapping_add(1))
+        .wrapping_add(atom_count.wrapping_sub(1) >> low_bits)
 }
 
 /// First word of the lists of a level and layer, by the directory (12.3-1).
@@ -123,20 +125,49 @@ pub fn open_list(words: Words<'_>, start: u32, atom_count: u32, texel: u32) -> L
     let mut bit = group_bit.wrapping_add(count_bits.wrapping_mul(GROUP_TEXELS));
     let mut before = 0u32;
     while before < place {
-        let other = low_part(bit_window(words, stream, group_bit.wrapping_add(before.wrapping_mul(count_bits))), count_bits);
+        let other = low_part(
+            bit_window(words, stream, group_bit.wrapping_add(before.wrapping_mul(count_bits))),
+            count_bits,
+        );
         bit = bit.wrapping_add(list_bits(index_bits, value_bits, atom_count, other));
         before = before.wrapping_add(1);
     }
-    let count = low_part(bit_window(words, stream, group_bit.wrapping_add(place.wrapping_mul(count_bits))), count_bits);
+    let count = low_part(
+        bit_window(words, stream, group_bit.wrapping_add(place.wrapping_mul(count_bits))),
+        count_bits,
+    );
     let low_bits = list_low_bits(index_bits, count);
     let high_bit = bit.wrapping_add(count.wrapping_mul(low_bits.wrapping_add(value_bits)));
-    next_coefficient(words, List { stream, value_bits, low_bits, field_bit: bit, high_bit, high: 0, left: count, index: LIST_END, coefficient: 0 })
+    next_coefficient(
+        words,
+        List {
+            stream,
+            value_bits,
+            low_bits,
+            field_bit: bit,
+            high_bit,
+            high: 0,
+            left: count,
+            index: LIST_END,
+            coefficient: 0,
+        },
+    )
 }
 
 /// A list that is at its end: that of a texel without weight.
 pub fn no_list() -> List {
     // 12.5-4: a weight of zero adds zero.
-    List { stream: 0, value_bits: 0, low_bits: 0, field_bit: 0, high_bit: 0, high: 0, left: 0, index: LIST_END, coefficient: 0 }
+    List {
+        stream: 0,
+        value_bits: 0,
+        low_bits: 0,
+        field_bit: 0,
+        high_bit: 0,
+        high: 0,
+        left: 0,
+        index: LIST_END,
+        coefficient: 0,
+    }
 }
 
 /// One channel of a light atom at one light: ten bits with their sign (12.1).
@@ -157,7 +188,15 @@ pub fn blend_light(a: u32, b: u32, c: u32, light: Taps, channel: u32) -> i32 {
 }
 
 /// Adds one fibre of an ABRDF atom to its sums (12.5-2).
-pub fn add_fibre(words: Words<'_>, material: &Material, atom: u32, view: u32, weight_q15: i32, light: Taps, sums: Values) -> Values {
+pub fn add_fibre(
+    words: Words<'_>,
+    material: &Material,
+    atom: u32,
+    view: u32,
+    weight_q15: i32,
+    light: Taps,
+    sums: Values,
+) -> Values {
     let light_start = material.light_atoms_start;
     let row_words = word(words, light_start);
     let row_a = light_start.wrapping_add(2).wrapping_add(light.a.wrapping_mul(row_words));
@@ -193,7 +232,14 @@ pub fn add_fibre(words: Words<'_>, material: &Material, atom: u32, view: u32, we
 }
 
 /// Three channels of an ABRDF atom between three views and three lights, Q15 (12.5-3).
-pub fn angular_q15(words: Words<'_>, material: &Material, atom: u32, shift: u32, light: Taps, view: Taps) -> Values {
+pub fn angular_q15(
+    words: Words<'_>,
+    material: &Material,
+    atom: u32,
+    shift: u32,
+    light: Taps,
+    view: Taps,
+) -> Values {
     let mut sums = Values { c0: 0, c1: 0, c2: 0 };
     // 12.5-2: a view without weight adds zero.
     if view.weight_a_q15 != 0 {
@@ -220,7 +266,16 @@ pub fn corner_weight(coefficient: i32, weight_x_q15: i32, weight_y_q15: i32) -> 
 }
 
 /// The textures of three channels by one layer of a level, Q20 (12.5).
-pub fn layer_q20(words: Words<'_>, material: &Material, level: u32, layer: u32, x: Axis, y: Axis, light: Taps, view: Taps) -> Values {
+pub fn layer_q20(
+    words: Words<'_>,
+    material: &Material,
+    level: u32,
+    layer: u32,
+    x: Axis,
+    y: Axis,
+    light: Taps,
+    view: Taps,
+) -> Values {
     let start = lists_start(words, material, level, layer);
     let fibres_start = material.fibres_start;
     let atom_count = word(words, fibres_start);
@@ -297,7 +352,15 @@ pub fn layer_q20(words: Words<'_>, material: &Material, level: u32, layer: u32, 
 /// The textures of three channels between texels, all layers, Q20 (12.5-7).
 // Apart, so that a sample of another method does not pay for this one's stack.
 #[inline(never)]
-pub fn textures_q20(words: Words<'_>, material: &Material, level: u32, x: Axis, y: Axis, light: Taps, view: Taps) -> Values {
+pub fn textures_q20(
+    words: Words<'_>,
+    material: &Material,
+    level: u32,
+    x: Axis,
+    y: Axis,
+    light: Taps,
+    view: Taps,
+) -> Values {
     let mut sums = Values { c0: 0, c1: 0, c2: 0 };
     let mut layer = 0u32;
     // 12.5-7: layers add up; each is rounded by itself.

@@ -1,8 +1,8 @@
 //! Batches and images of a sparse tensor: the same bits as a sample at a time, with the work shared.
 //!
-//! A sample of a batch blends all light atoms of its light once, in one place that stays in the cache, where the
-//! plain path blends one for every entry of a fibre. An image evaluates every ABRDF atom once, and a texel is then
-//! its list alone: that is what the order of products of 12.5 is for.
+//! A sample of a batch blends all light atoms of its light once, in one place that stays in the cache, where
+//! the plain path blends one for every entry of a fibre. An image evaluates every ABRDF atom once, and a
+//! texel is then its list alone: that is what the order of products of 12.5 is for.
 
 use crate::colour::Values;
 use crate::direction::Taps;
@@ -13,14 +13,16 @@ use crate::position::{Axis, axis_at_position};
 use crate::records::bytes_from;
 use crate::stream::{Ones, window};
 use crate::tensor::{
-    ANGULAR_BOUND, GROUP_TEXELS, LAYER_BOUND, blend_light, corner_weight, light_entry, list_bits, list_coefficient, list_low_bits, lists_start,
+    ANGULAR_BOUND, GROUP_TEXELS, LAYER_BOUND, blend_light, corner_weight, light_entry, list_bits,
+    list_coefficient, list_low_bits, lists_start,
 };
 use crate::tensor_set::FIBRE_LIMIT;
 use crate::words::{low_part, word};
 
 /// Three channels side by side, and one that is not used.
 type Lanes = [i32; 4];
-/// Words of a [`LightTable`]: a place is below 1024 by its mask, and four words follow it, so that no place has to be checked.
+/// Words of a [`LightTable`]: a place is below 1024 by its mask, and four words follow it, so that no place
+/// has to be checked.
 const TABLE_WORDS: usize = 1024 + 4;
 /// Light atoms at one light, three words each.
 type LightTable = [i32; TABLE_WORDS];
@@ -37,7 +39,8 @@ const AHEAD: usize = 4;
 /// The place behind the last entry.
 const END: u16 = u16::MAX;
 
-/// The entries of an ABRDF atom's fibres at three views: how much of a light atom, and the word where its light begins.
+/// The entries of an ABRDF atom's fibres at three views: how much of a light atom, and the word where its
+/// light begins.
 struct Entries {
     weights: [i32; ENTRIES],
     places: [u16; ENTRIES],
@@ -64,7 +67,12 @@ impl<'s> Room<'s> {
     pub fn new(scratch: &'s mut [i32]) -> Option<Room<'s>> {
         scratch.fill(0);
         let (table, rest) = scratch.split_at_mut_checked(TABLE_WORDS)?;
-        Some(Room { table: table.first_chunk_mut()?, weights: rest.first_chunk_mut()?, atoms: [0; WEIGHTS], entries: [Entries::NONE; AHEAD] })
+        Some(Room {
+            table: table.first_chunk_mut()?,
+            weights: rest.first_chunk_mut()?,
+            atoms: [0; WEIGHTS],
+            entries: [Entries::NONE; AHEAD],
+        })
     }
 }
 
@@ -91,7 +99,9 @@ impl<'a> Atoms<'a> {
             lights: bytes_from(words, material.light_atoms_start.wrapping_add(2)).as_chunks::<4>().0,
             light_atoms: word(words, material.light_atoms_start) as usize,
             shifts,
-            fibres: bytes_from(words, material.fibres_start.wrapping_add(2).wrapping_add(count as u32)).as_chunks::<2>().0,
+            fibres: bytes_from(words, material.fibres_start.wrapping_add(2).wrapping_add(count as u32))
+                .as_chunks::<2>()
+                .0,
             entries: (shape & 0xff) as usize,
             index_mask: (1u16 << ((shape >> 8) & 15)).wrapping_sub(1),
         }
@@ -103,9 +113,15 @@ impl<'a> Atoms<'a> {
             let start = (index as usize).wrapping_mul(self.light_atoms);
             self.lights.get(start..start.wrapping_add(self.light_atoms)).unwrap_or(&[])
         };
-        for (((slot, a), b), c) in table.as_chunks_mut::<3>().0.iter_mut().zip(row(light.a)).zip(row(light.b)).zip(row(light.c)) {
+        for (((slot, a), b), c) in
+            table.as_chunks_mut::<3>().0.iter_mut().zip(row(light.a)).zip(row(light.b)).zip(row(light.c))
+        {
             let (a, b, c) = (u32::from_le_bytes(*a), u32::from_le_bytes(*b), u32::from_le_bytes(*c));
-            *slot = [blend_light(a, b, c, light, 0), blend_light(a, b, c, light, 1), blend_light(a, b, c, light, 2)];
+            *slot = [
+                blend_light(a, b, c, light, 0),
+                blend_light(a, b, c, light, 1),
+                blend_light(a, b, c, light, 2),
+            ];
         }
     }
 
@@ -139,20 +155,24 @@ impl<'a> Atoms<'a> {
     /// The fibres of three views, each from its first on, and the views' weights.
     #[inline(always)]
     fn rows(&self, view: Taps) -> [Row<'a>; 3] {
-        [(view.a, view.weight_a_q15), (view.b, view.weight_b_q15), (view.c, view.weight_c_q15)].map(|(view, weight)| {
-            let first = (view as usize).wrapping_mul(self.shifts.len()).wrapping_mul(self.entries);
-            Row { fibres: self.fibres.get(first..).unwrap_or(&[]), weight }
-        })
+        [(view.a, view.weight_a_q15), (view.b, view.weight_b_q15), (view.c, view.weight_c_q15)].map(
+            |(view, weight)| {
+                let first = (view as usize).wrapping_mul(self.shifts.len()).wrapping_mul(self.entries);
+                Row { fibres: self.fibres.get(first..).unwrap_or(&[]), weight }
+            },
+        )
     }
 
-    /// Whether all fibres of the views are within a group, and have one behind them in the file, as nearly all have.
+    /// Whether all fibres of the views are within a group, and have one behind them in the file, as nearly
+    /// all have.
     #[inline(always)]
     fn are_short(&self, rows: &[Row<'a>; 3]) -> bool {
         let most = self.shifts.len().wrapping_mul(self.entries).wrapping_add(GROUP);
         self.entries <= GROUP && rows.iter().all(|row| row.fibres.len() >= most)
     }
 
-    /// Gathers the entries of an ABRDF atom at three views, weighed (12.5-2), and gives the atom's shifts (12.2).
+    /// Gathers the entries of an ABRDF atom at three views, weighed (12.5-2), and gives the atom's shifts
+    /// (12.2).
     // What a group has behind its fibre is overwritten by the next, or lies behind the end.
     #[inline(always)]
     fn gather<const SHORT: bool>(&self, atom: u32, rows: &[Row<'a>; 3], into: &mut Entries) -> u32 {
@@ -181,9 +201,14 @@ impl<'a> Atoms<'a> {
     #[inline(always)]
     fn weigh(&self, group: &[[u8; 2]; GROUP], weight: i32, into: &mut Entries, at: usize) {
         let group = group.map(u16::from_le_bytes);
-        let slots = (into.weights.get_mut(at..).and_then(<[i32]>::first_chunk_mut), into.places.get_mut(at..).and_then(<[u16]>::first_chunk_mut));
+        let slots = (
+            into.weights.get_mut(at..).and_then(<[i32]>::first_chunk_mut),
+            into.places.get_mut(at..).and_then(<[u16]>::first_chunk_mut),
+        );
         if let (Some(weights), Some(places)) = slots {
-            *weights = group.map(|entry| ((entry & !self.index_mask) as i16 as i32).wrapping_mul(weight).wrapping_add(0x10000) >> 17);
+            *weights = group.map(|entry| {
+                ((entry & !self.index_mask) as i16 as i32).wrapping_mul(weight).wrapping_add(0x10000) >> 17
+            });
             *places = group.map(|entry| (entry & self.index_mask).wrapping_mul(3));
         }
     }
@@ -231,7 +256,8 @@ fn round_lanes(lanes: Lanes, shift: u32) -> Lanes {
 }
 
 /// An ABRDF atom between three views and lights (12.5-2, 12.5-3), from its gathered entries.
-// A loop that ends by what it finds is not turned on its side by the compiler, where a counted one becomes lanes of entries instead of channels.
+// A loop that ends by what it finds is not turned on its side by the compiler, where a counted one becomes
+// lanes of entries instead of channels.
 #[inline(always)]
 fn angular(entries: &Entries, table: &LightTable, shift: u32) -> Lanes {
     let mut sums = [0i32; 4];
@@ -239,7 +265,9 @@ fn angular(entries: &Entries, table: &LightTable, shift: u32) -> Lanes {
         if *place == END {
             break;
         }
-        let Some(light) = table.get((*place & 0x3ff) as usize..).and_then(<[i32]>::first_chunk::<4>) else { break };
+        let Some(light) = table.get((*place & 0x3ff) as usize..).and_then(<[i32]>::first_chunk::<4>) else {
+            break;
+        };
         for (sum, u) in sums.iter_mut().zip(light) {
             *sum = sum.wrapping_add(weight.wrapping_mul(*u));
         }
@@ -306,11 +334,19 @@ impl<'a> Lists<'a> {
         }
     }
 
-    /// Adds up the weights of the ABRDF atoms that the lists of the texels have (12.5-4), notes the atoms, and gives the number of notes. An atom is
-    /// noted when its weight is zero, so one whose weight passes through zero is noted again: who takes the weights finds zero at all notes but one.
+    /// Adds up the weights of the ABRDF atoms that the lists of the texels have (12.5-4), notes the atoms,
+    /// and gives the number of notes. An atom is noted when its weight is zero, so one whose weight
+    /// passes through zero is noted again: who takes the weights finds zero at all notes but one.
     // Apart, for the registers.
     #[inline(never)]
-    fn merge(&self, width: u32, x: [(u32, i32); 2], y: [(u32, i32); 2], weights: &mut [i32; WEIGHTS], atoms: &mut [u16; WEIGHTS]) -> usize {
+    fn merge(
+        &self,
+        width: u32,
+        x: [(u32, i32); 2],
+        y: [(u32, i32); 2],
+        weights: &mut [i32; WEIGHTS],
+        atoms: &mut [u16; WEIGHTS],
+    ) -> usize {
         let mut met = 0usize;
         for (row, weight_y) in y {
             for (column, weight_x) in x {
@@ -337,7 +373,12 @@ impl<'a> Lists<'a> {
         let mut counts = window(self.stream, first);
         let mut bit = first.wrapping_add(self.count_bits.wrapping_mul(GROUP_TEXELS));
         for _ in 0..texel & 7 {
-            bit = bit.wrapping_add(list_bits(self.index_bits, self.value_bits, self.atom_count, (counts & mask) as u32));
+            bit = bit.wrapping_add(list_bits(
+                self.index_bits,
+                self.value_bits,
+                self.atom_count,
+                (counts & mask) as u32,
+            ));
             counts >>= self.count_bits & 15;
         }
         let count = (counts & mask) as u32;
@@ -345,7 +386,15 @@ impl<'a> Lists<'a> {
         let highs = bit.wrapping_add(count.wrapping_mul(low_bits.wrapping_add(self.value_bits)));
         let end = bit.wrapping_add(list_bits(self.index_bits, self.value_bits, self.atom_count, count));
         let ones = Ones::new(self.stream, highs, end);
-        Reader { stream: self.stream, left: count, low_bits, value_bits: self.value_bits, field_bit: bit, ones, taken: highs }
+        Reader {
+            stream: self.stream,
+            left: count,
+            low_bits,
+            value_bits: self.value_bits,
+            field_bit: bit,
+            ones,
+            taken: highs,
+        }
     }
 }
 
@@ -388,7 +437,11 @@ pub(crate) struct TensorSampler<'a, 's> {
 impl<'a, 's> TensorSampler<'a, 's> {
     /// Words of scratch: unpacked light atoms.
     pub fn scratch_len(selvedge: &Selvedge<'a>) -> usize {
-        if selvedge.material().full_count == 0 { 0 } else { Atoms::of(selvedge).unpacked_len(selvedge.material().light_count) }
+        if selvedge.material().full_count == 0 {
+            0
+        } else {
+            Atoms::of(selvedge).unpacked_len(selvedge.material().light_count)
+        }
     }
 
     /// With scratch of the length that was asked for.
@@ -399,10 +452,20 @@ impl<'a, 's> TensorSampler<'a, 's> {
     }
 
     /// [`crate::tensor::textures_q20`] at level 0, the same bits.
-    pub fn textures(&self, selvedge: &Selvedge<'a>, u_q32: u32, v_q32: u32, light: Taps, view: Taps, room: &mut Room<'_>) -> Values {
+    pub fn textures(
+        &self,
+        selvedge: &Selvedge<'a>,
+        u_q32: u32,
+        v_q32: u32,
+        light: Taps,
+        view: Taps,
+        room: &mut Room<'_>,
+    ) -> Values {
         let Room { table, weights, atoms, entries } = room;
         let material = selvedge.material();
-        let axis = |size: u32, position: u32| two_texels(axis_at_position(material.edge, material.edge_reciprocal_q18, size, position));
+        let axis = |size: u32, position: u32| {
+            two_texels(axis_at_position(material.edge, material.edge_reciprocal_q18, size, position))
+        };
         let (x, y) = (axis(material.width, u_q32), axis(material.height, v_q32));
         self.atoms.blend_unpacked(self.lights, light, table);
         let rows = self.atoms.rows(view);
@@ -431,7 +494,14 @@ pub(crate) fn image_scratch_len(selvedge: &Selvedge<'_>) -> usize {
 }
 
 /// The textures of the three channels for every texel of a level, row by row.
-pub(crate) fn image_textures(selvedge: &Selvedge<'_>, level: u32, light: Taps, view: Taps, scratch: &mut [i32], mut put: impl FnMut(usize, [i32; 3])) {
+pub(crate) fn image_textures(
+    selvedge: &Selvedge<'_>,
+    level: u32,
+    light: Taps,
+    view: Taps,
+    scratch: &mut [i32],
+    mut put: impl FnMut(usize, [i32; 3]),
+) {
     let material = selvedge.material();
     let atoms = Atoms::of(selvedge);
     let mut table = [0; TABLE_WORDS];
@@ -456,7 +526,10 @@ pub(crate) fn image_textures(selvedge: &Selvedge<'_>, level: u32, light: Taps, v
             for (atom, coefficient) in lists.list(texel) {
                 let Some(&[c0, c1, c2, gain_shift]) = values.get(atom as usize) else { break };
                 for (sum, angular) in total.iter_mut().zip([c0, c1, c2]) {
-                    *sum = sum.wrapping_add(round_shift(multiply_q15(coefficient << 15, angular), gain_shift as u32));
+                    *sum = sum.wrapping_add(round_shift(
+                        multiply_q15(coefficient << 15, angular),
+                        gain_shift as u32,
+                    ));
                 }
             }
             for (texture, part) in textures.iter_mut().zip(to_q20(total, lists.shift)) {

@@ -46,8 +46,14 @@ pub(crate) fn check_tensor_dictionary(check: &mut Check<'_, '_>, header: &Header
     Some(())
 }
 
-/// Walks chapter 12 of a material, but for its statement of cost; gives the largest operations of a level's textures.
-pub(crate) fn check_tensor(check: &mut Check<'_, '_>, header: &Header, external: Option<&Header>, material: &mut Material) -> Option<u64> {
+/// Walks chapter 12 of a material, but for its statement of cost; gives the largest operations of a level's
+/// textures.
+pub(crate) fn check_tensor(
+    check: &mut Check<'_, '_>,
+    header: &Header,
+    external: Option<&Header>,
+    material: &mut Material,
+) -> Option<u64> {
     if !header.has_texture() {
         return Some(0);
     }
@@ -82,7 +88,12 @@ fn atoms_of(check: &Check<'_, '_>, header: &Header) -> Option<Atoms> {
     let light = find_section(check, header, LIGHT_ATOMS, 0)?;
     let fibres = find_section(check, header, FIBRES, 0)?;
     let entries = check.word_at(fibres.offset + 4) & 0xff;
-    Some(Atoms { light_start: check.section_start(light), fibres_start: check.section_start(fibres), count: check.word_at(fibres.offset), entries })
+    Some(Atoms {
+        light_start: check.section_start(light),
+        fibres_start: check.section_start(fibres),
+        count: check.word_at(fibres.offset),
+        entries,
+    })
 }
 
 /// Walks 12.1 and 12.2.
@@ -100,10 +111,18 @@ fn check_light_atoms(check: &mut Check<'_, '_>, header: &Header) -> Option<u32> 
         return None;
     }
     let (count, reserved) = (check.word_at(offset), check.word_at(offset + 4));
-    let counted = check.ensure((1..=LIGHT_ATOM_LIMIT).contains(&count), Rule::LightAtomsCounts, offset, count);
+    let counted =
+        check.ensure((1..=LIGHT_ATOM_LIMIT).contains(&count), Rule::LightAtomsCounts, offset, count);
     check.ensure(reserved == 0, Rule::LightAtomsCounts, offset + 4, reserved);
     // At most 8 + 4 * 1024 * 256 bytes.
-    if !counted || !check.ensure(section.length == 8 + 4 * header.light_count * count, Rule::LightAtomsLength, offset, section.length) {
+    if !counted
+        || !check.ensure(
+            section.length == 8 + 4 * header.light_count * count,
+            Rule::LightAtomsLength,
+            offset,
+            section.length,
+        )
+    {
         return None;
     }
     let mut unused = 0xc000_0000u32;
@@ -159,7 +178,12 @@ fn check_fibres(check: &mut Check<'_, '_>, header: &Header, light_atoms: u32) ->
             let Some(half) = halves.next() else { break };
             let entry = u16::from_le_bytes(*half);
             let index = entry & index_mask;
-            check.ensure((index as u32) < light_atoms, Rule::FibreIndex, table + (fibre * entries + n) * 2, entry as u32);
+            check.ensure(
+                (index as u32) < light_atoms,
+                Rule::FibreIndex,
+                table + (fibre * entries + n) * 2,
+                entry as u32,
+            );
             sum += ((entry - index) as i16).unsigned_abs() as u32;
         }
         check.ensure(sum <= FIBRE_SUM_LIMIT, Rule::FibreSum, table + fibre * entries * 2, sum);
@@ -185,14 +209,23 @@ struct Stream<'a> {
 }
 
 /// Walks 12.3, 12.4 and 12.5-8; gives the largest count of a list.
-fn check_lists(check: &mut Check<'_, '_>, section: Section, header: &Header, level: u32, atoms: Atoms) -> Option<u32> {
+fn check_lists(
+    check: &mut Check<'_, '_>,
+    section: Section,
+    header: &Header,
+    level: u32,
+    atoms: Atoms,
+) -> Option<u32> {
     let offset = section.offset;
     if !check.ensure(section.length >= 16, Rule::ListsLength, offset, section.length) {
         return None;
     }
     let head = check.word_at(offset);
-    let (value_bits, count_bits, index_bits, shift) = (head & 0xff, (head >> 8) & 0xff, (head >> 16) & 0xff, head >> 24);
-    let in_range = (1..=VALUE_BITS_LIMIT).contains(&value_bits) && (1..=COUNT_BITS_LIMIT).contains(&count_bits) && shift <= 31;
+    let (value_bits, count_bits, index_bits, shift) =
+        (head & 0xff, (head >> 8) & 0xff, (head >> 16) & 0xff, head >> 24);
+    let in_range = (1..=VALUE_BITS_LIMIT).contains(&value_bits)
+        && (1..=COUNT_BITS_LIMIT).contains(&count_bits)
+        && shift <= 31;
     if !check.ensure(in_range && index_bits == bit_length(atoms.count - 1), Rule::ListsHeader, offset, head) {
         return None;
     }
@@ -231,11 +264,20 @@ fn check_lists(check: &mut Check<'_, '_>, section: Section, header: &Header, lev
     Some(largest)
 }
 
-/// The lists of a group, of whose texels `left` or more are in the image: its end and the largest count so far.
-fn check_group(check: &mut Check<'_, '_>, stream: &Stream<'_>, first: u32, left: u32, atoms: Atoms, mut largest: u32) -> Option<(u32, u32)> {
+/// The lists of a group, of whose texels `left` or more are in the image: its end and the largest count so
+/// far.
+fn check_group(
+    check: &mut Check<'_, '_>,
+    stream: &Stream<'_>,
+    first: u32,
+    left: u32,
+    atoms: Atoms,
+    mut largest: u32,
+) -> Option<(u32, u32)> {
     let place = |bit: u32| stream.offset + (bit >> 5) * 4;
     let heads = stream.count_bits * GROUP_TEXELS;
-    if !check.ensure(first as u64 + heads as u64 <= stream.bits as u64, Rule::ListPlace, place(first), first) {
+    if !check.ensure(first as u64 + heads as u64 <= stream.bits as u64, Rule::ListPlace, place(first), first)
+    {
         return None;
     }
     let counts = window(stream.bytes, first);
@@ -262,7 +304,14 @@ fn check_group(check: &mut Check<'_, '_>, stream: &Stream<'_>, first: u32, left:
 }
 
 /// One list: its indices, and the bound of its sum.
-fn check_list(check: &mut Check<'_, '_>, stream: &Stream<'_>, bit: u32, count: u32, length: u32, atoms: Atoms) {
+fn check_list(
+    check: &mut Check<'_, '_>,
+    stream: &Stream<'_>,
+    bit: u32,
+    count: u32,
+    length: u32,
+    atoms: Atoms,
+) {
     let at = stream.offset + (bit >> 5) * 4;
     let low_bits = list_low_bits(stream.index_bits, count);
     let field_bits = low_bits + stream.value_bits;
@@ -275,8 +324,10 @@ fn check_list(check: &mut Check<'_, '_>, stream: &Stream<'_>, bit: u32, count: u
             let index = (place - highs - seen) << low_bits | low_part(field, low_bits);
             sound &= index >= next && index < atoms.count;
             next = index + 1;
-            let coefficient = list_coefficient(low_part(field >> low_bits, stream.value_bits), stream.value_bits);
-            let gain_shift = (word(check.words, atoms.fibres_start + 2 + index.min(atoms.count - 1)) >> 5) & 31;
+            let coefficient =
+                list_coefficient(low_part(field >> low_bits, stream.value_bits), stream.value_bits);
+            let gain_shift =
+                (word(check.words, atoms.fibres_start + 2 + index.min(atoms.count - 1)) >> 5) & 31;
             sum += coefficient.unsigned_abs().div_ceil(1 << gain_shift);
         }
         seen += 1;

@@ -16,7 +16,8 @@ pub struct Words<'a> {
     pub dictionary: &'a [u8],
 }
 
-/// The word at `index`; zero outside the file (1.2-1). Only a window at the end of a stream reads there, and does not use it.
+/// The word at `index`; zero outside the file (1.2-1). Only a window at the end of a stream reads there, and
+/// does not use it.
 #[inline(always)]
 pub fn word(words: Words<'_>, index: u32) -> u32 {
     let bytes = if index < DICTIONARY_START { words.file } else { words.dictionary };

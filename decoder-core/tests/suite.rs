@@ -1,6 +1,9 @@
-//! The conformance suite, with nothing but the core: every vector is answered as its manifest states, on every path.
+//! The conformance suite, with nothing but the core: every vector is answered as its manifest states, on
+//! every path.
 
-use selvedge::{BufferTooSmall, Direction, FilteredQuery, First, Limits, Part, Rgb, Selvedge, open_with, validate};
+use selvedge::{
+    BufferTooSmall, Direction, FilteredQuery, First, Limits, Part, Rgb, Selvedge, open_with, validate,
+};
 use std::path::{Path, PathBuf};
 
 fn folder() -> PathBuf {
@@ -24,8 +27,11 @@ fn fast_paths_agree(material: &Selvedge<'_>) {
     };
     let queries: Vec<FilteredQuery> = (0..48)
         .map(|_| {
-            let mut direction =
-                || Direction { x_q18: (next() >> 13) as i32 - 262_144, y_q18: (next() >> 13) as i32 - 262_144, z_q15: (next() >> 16) as i32 - 100 };
+            let mut direction = || Direction {
+                x_q18: (next() >> 13) as i32 - 262_144,
+                y_q18: (next() >> 13) as i32 - 262_144,
+                z_q15: (next() >> 16) as i32 - 100,
+            };
             let (light, view) = (direction(), direction());
             FilteredQuery { u_q32: next(), v_q32: next(), light, view }
         })
@@ -35,7 +41,12 @@ fn fast_paths_agree(material: &Selvedge<'_>) {
     for i in 0..8 {
         let (light, view) = (material.light_direction(i), material.view_direction(i));
         queries.push(FilteredQuery { u_q32: next(), v_q32: next(), light, view });
-        queries.push(FilteredQuery { u_q32: next(), v_q32: next(), light: Direction { z_q15: 0, ..light }, view: Direction { z_q15: 0, ..view } });
+        queries.push(FilteredQuery {
+            u_q32: next(),
+            v_q32: next(),
+            light: Direction { z_q15: 0, ..light },
+            view: Direction { z_q15: 0, ..view },
+        });
     }
     // At centres, edges and half way between texels, where neighbours weigh the same or nothing.
     for i in 0..16u32 {
@@ -54,7 +65,10 @@ fn fast_paths_agree(material: &Selvedge<'_>) {
     assert_eq!((&longer[..queries.len()], longer[queries.len()]), (&out[..], Rgb { r: 7, g: 7, b: 7 }));
     let short = BufferTooSmall { needed: queries.len(), lent: queries.len() - 1 };
     assert_eq!(material.sample_batch(&queries, &mut scratch, &mut longer[..queries.len() - 1]), Err(short));
-    assert!(material.sample_batch(&queries, &mut scratch[1..], &mut out).is_err() || material.batch_scratch_len(queries.len()) == 0);
+    assert!(
+        material.sample_batch(&queries, &mut scratch[1..], &mut out).is_err()
+            || material.batch_scratch_len(queries.len()) == 0
+    );
     assert_eq!(material.image_size(0), [material.header().width, material.header().height]);
     for level in 0..material.header().level_count {
         let [width, height] = material.image_size(level);
@@ -75,8 +89,18 @@ fn fast_paths_agree(material: &Selvedge<'_>) {
         let (light, view) = (material.locate_light(light), material.locate_view(view));
         for i in (0..texels).step_by(1 + texels / 200).filter(|_| level == 0) {
             let (x, y) = (i as u32 % width, i as u32 / width);
-            let values = selvedge::interpolation::texel_values(material.words(), material.material(), x, y, light, view);
-            assert_eq!((selvedge::interpolation::radiance(material.material(), values, light), values.c0), (image[i], channel[i]));
+            let values = selvedge::interpolation::texel_values(
+                material.words(),
+                material.material(),
+                x,
+                y,
+                light,
+                view,
+            );
+            assert_eq!(
+                (selvedge::interpolation::radiance(material.material(), values, light), values.c0),
+                (image[i], channel[i])
+            );
         }
     }
 }
@@ -84,26 +108,39 @@ fn fast_paths_agree(material: &Selvedge<'_>) {
 /// A sample direction is found, alone and whole; on the horizon no light arrives (5.1-4, 5.6-3).
 fn sample_directions_are_found(material: &Selvedge<'_>) {
     let (header, m) = (material.header(), material.material());
-    for (is_light, start, count) in [(true, m.light_start, header.light_count), (false, m.view_start, header.view_count)] {
-        let direction = |i: u32| if is_light { material.light_direction(i) } else { material.view_direction(i) };
-        let locate = |asked: Direction| if is_light { material.locate_light(asked) } else { material.locate_view(asked) };
+    for (is_light, start, count) in
+        [(true, m.light_start, header.light_count), (false, m.view_start, header.view_count)]
+    {
+        let direction =
+            |i: u32| if is_light { material.light_direction(i) } else { material.view_direction(i) };
+        let locate = |asked: Direction| {
+            if is_light { material.locate_light(asked) } else { material.locate_view(asked) }
+        };
         for i in 0..count {
             let pair = selvedge::direction::point(material.words(), start, i);
             let asked = direction(i);
-            assert_eq!([asked.x_q18, asked.y_q18], [(pair as u16 as i16 as i32) * 16, ((pair >> 16) as u16 as i16 as i32) * 16]);
+            assert_eq!(
+                [asked.x_q18, asked.y_q18],
+                [(pair as u16 as i16 as i32) * 16, ((pair >> 16) as u16 as i16 as i32) * 16]
+            );
             let taps = locate(asked);
             let all = [(taps.a, taps.weight_a_q15), (taps.b, taps.weight_b_q15), (taps.c, taps.weight_c_q15)];
             let own: i32 = all.iter().filter(|t| t.0 == i).map(|t| t.1).sum();
             assert_eq!((own, taps.weight_a_q15 + taps.weight_b_q15 + taps.weight_c_q15), (32_768, 32_768));
             for (z_q15, lit) in [(0, false), (-1, false), (asked.z_q15, asked.z_q15 > 0)] {
-                assert_eq!(!is_light || locate(Direction { z_q15, ..asked }).cosine_q15 > 0, !is_light || lit, "{z_q15}");
+                assert_eq!(
+                    !is_light || locate(Direction { z_q15, ..asked }).cosine_q15 > 0,
+                    !is_light || lit,
+                    "{z_q15}"
+                );
             }
             assert_eq!(direction(u32::MAX), direction(count - 1));
         }
     }
 }
 
-/// Behind other words and a dictionary before or behind it, a file gives the same, by the record for that place.
+/// Behind other words and a dictionary before or behind it, a file gives the same, by the record for that
+/// place.
 fn place_does_not_matter(material: &Selvedge<'_>, file: &[u8], dictionary: &[u8]) {
     use selvedge::interpolation::{filtered_values, locate_light, locate_view, point_values, radiance};
     for is_behind in [true, false] {
@@ -117,14 +154,33 @@ fn place_does_not_matter(material: &Selvedge<'_>, file: &[u8], dictionary: &[u8]
         let placed = material.material_at(starts[0], starts[1]);
         for i in 0..24u32 {
             let (u, v) = (i.wrapping_mul(0x9e37_79b9), i.wrapping_mul(0x85eb_ca6b));
-            let (x, y, light, view) = (u % placed.width, v % placed.height, (u >> 3) % placed.light_count, (v >> 3) % placed.view_count);
-            assert_eq!(point_values(words, &placed, x, y, light, view), material.point_values(x, y, light, view));
+            let (x, y, light, view) = (
+                u % placed.width,
+                v % placed.height,
+                (u >> 3) % placed.light_count,
+                (v >> 3) % placed.view_count,
+            );
+            assert_eq!(
+                point_values(words, &placed, x, y, light, view),
+                material.point_values(x, y, light, view)
+            );
             let (light, view) = (material.light_direction(light), material.view_direction(view));
-            let (own_light, own_view) = (locate_light(words, &placed, light), locate_view(words, &placed, view));
+            let (own_light, own_view) =
+                (locate_light(words, &placed, light), locate_view(words, &placed, view));
             let values = filtered_values(words, &placed, placed.level_count - 1, u, v, own_light, own_view);
-            let wanted =
-                filtered_values(material.words(), material.material(), placed.level_count - 1, u, v, material.locate_light(light), material.locate_view(view));
-            assert_eq!(radiance(&placed, values, own_light), radiance(material.material(), wanted, own_light));
+            let wanted = filtered_values(
+                material.words(),
+                material.material(),
+                placed.level_count - 1,
+                u,
+                v,
+                material.locate_light(light),
+                material.locate_view(view),
+            );
+            assert_eq!(
+                radiance(&placed, values, own_light),
+                radiance(material.material(), wanted, own_light)
+            );
         }
     }
 }
@@ -135,10 +191,19 @@ fn what_a_file_holds_is_told(material: &Selvedge<'_>, file: &[u8]) {
     let mut sections = 0;
     for (n, section) in material.sections().enumerate() {
         let entry = 128 + 16 * n;
-        assert_eq!([section.kind | section.instance << 16, section.offset, section.length], [word(entry), word(entry + 4), word(entry + 8)]);
+        assert_eq!(
+            [section.kind | section.instance << 16, section.offset, section.length],
+            [word(entry), word(entry + 4), word(entry + 8)]
+        );
         if section.kind == 1 {
             let (metadata, at) = (material.metadata(), section.offset as usize);
-            let codes = [metadata.texel_width_nm, metadata.texel_height_nm, metadata.frame, metadata.image_origin, metadata.primaries];
+            let codes = [
+                metadata.texel_width_nm,
+                metadata.texel_height_nm,
+                metadata.frame,
+                metadata.image_origin,
+                metadata.primaries,
+            ];
             assert_eq!(codes, [0, 4, 8, 12, 16].map(|field| word(at + field)));
             let mut text = at + 32;
             for told in [metadata.name, metadata.origin, metadata.licence] {
@@ -163,7 +228,8 @@ fn the_suite_is_answered_as_stated() {
         let valid = columns[0] == "valid";
         let mut limits = Limits::NONE;
         if !valid && columns[3] != "-" {
-            let all: Vec<u32> = columns[3].split(',').map(number).map(|n| if n == 0 { u32::MAX } else { n }).collect();
+            let all: Vec<u32> =
+                columns[3].split(',').map(number).map(|n| if n == 0 { u32::MAX } else { n }).collect();
             limits = Limits { bytes: all[0], operations: all[1], texels: all[2] };
         }
         let is_dictionary = file.get(16) == Some(&1);
@@ -202,7 +268,10 @@ fn the_examples_say_what_they_are() {
     let file = read("valid/tensor-example.selv");
     let material = selvedge::open(&file, &Limits::NONE).expect("legal");
     let metadata = material.metadata();
-    assert_eq!([metadata.name, metadata.origin, metadata.licence], ["tensor example", "the specification", "CC0-1.0"]);
+    assert_eq!(
+        [metadata.name, metadata.origin, metadata.licence],
+        ["tensor example", "the specification", "CC0-1.0"]
+    );
 }
 
 /// What makes queries and shows answers, beside the arithmetic.
@@ -222,7 +291,10 @@ fn numbers_and_words_of_callers() {
     assert_eq!(open(&file, &Limits::NONE).expect("legal").header().minor_version, 7);
     let finding = Finding { rule: Rule::SectionPadding, part: Part::Dictionary, offset: 40, found: 255 };
     let words = finding.to_string();
-    assert!(words.starts_with("dictionary: 3.2-5 at byte 40: ") && words.ends_with("; found 255 (0xff)"), "{words}");
+    assert!(
+        words.starts_with("dictionary: 3.2-5 at byte 40: ") && words.ends_with("; found 255 (0xff)"),
+        "{words}"
+    );
     assert!(!Finding { part: Part::File, ..finding }.to_string().contains("dictionary"));
     assert_eq!(BufferTooSmall { needed: 5, lent: 4 }.to_string(), "the buffer has 4 elements, 5 are needed");
 

@@ -22,10 +22,17 @@ fn sample_material(material: &Selvedge<'_>, u: u32, v: u32, light: Direction, vi
 }
 
 pub fn start() -> ! {
-    let limits = Limits { bytes: black_box(1 << 20), operations: black_box(1 << 20), texels: black_box(1 << 20) };
+    let limits =
+        Limits { bytes: black_box(1 << 20), operations: black_box(1 << 20), texels: black_box(1 << 20) };
     if let Some(material) = open_material(black_box(&BYTES), &limits) {
         let direction = || Direction { x_q18: black_box(1), y_q18: black_box(2), z_q15: black_box(3) };
-        black_box(sample_material(black_box(&material), black_box(1), black_box(2), direction(), direction()));
+        black_box(sample_material(
+            black_box(&material),
+            black_box(1),
+            black_box(2),
+            direction(),
+            direction(),
+        ));
     }
     end(true)
 }

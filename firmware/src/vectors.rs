@@ -26,7 +26,9 @@ struct Vector {
 static VECTORS: &[Vector] = include!(concat!(env!("OUT_DIR"), "/table.rs"));
 
 fn is_stated(finding: Finding, rule: &str, in_dictionary: bool, offset: u32, found: u32) -> bool {
-    finding.rule.id() == rule && (finding.part == Part::Dictionary) == in_dictionary && (finding.offset, finding.found) == (offset, found)
+    finding.rule.id() == rule
+        && (finding.part == Part::Dictionary) == in_dictionary
+        && (finding.offset, finding.found) == (offset, found)
 }
 
 fn is_right(vector: &Vector) -> bool {
@@ -48,7 +50,9 @@ fn is_right(vector: &Vector) -> bool {
     match (opened, &vector.answer) {
         (Ok(Some(material)), Answer::Digest(digest)) => material.decode_digest() == *digest,
         (Ok(None), Answer::Legal) => true,
-        (Err(finding), Answer::Broken(rule, in_dictionary, offset, found)) => is_stated(finding, rule, *in_dictionary, *offset, *found),
+        (Err(finding), Answer::Broken(rule, in_dictionary, offset, found)) => {
+            is_stated(finding, rule, *in_dictionary, *offset, *found)
+        }
         _ => false,
     }
 }
@@ -93,7 +97,8 @@ mod measure {
         unsafe { (low..here - 256).for_each(|at| (at as *mut u8).write_volatile(MARK)) };
         work();
         // SAFETY: as above.
-        let untouched = (low..here).take_while(|&at| unsafe { (at as *const u8).read_volatile() } == MARK).count();
+        let untouched =
+            (low..here).take_while(|&at| unsafe { (at as *const u8).read_volatile() } == MARK).count();
         (LENGTH - untouched) as u32
     }
 
@@ -117,7 +122,8 @@ mod measure {
         let part = |n: u32| (i.wrapping_mul(n) & 0x3ffff) as i32 - 0x20000;
         let light = Direction { x_q18: part(40_503), y_q18: part(30_011), z_q15: 20_000 };
         let view = Direction { x_q18: part(7_919), y_q18: part(65_537), z_q15: 20_000 };
-        material.filtered(i.wrapping_mul(2_654_435_761), i.wrapping_mul(40_503_001), light, view).to_words()[0]
+        material.filtered(i.wrapping_mul(2_654_435_761), i.wrapping_mul(40_503_001), light, view).to_words()
+            [0]
     }
 
     pub fn measure() {
@@ -132,7 +138,10 @@ mod measure {
             );
             let Ok(material) = open() else { continue };
             let mut sum = 0;
-            tell(b"  stack of a filtered sample ", depth(&mut || sum ^= sample(core::hint::black_box(&material), 3)));
+            tell(
+                b"  stack of a filtered sample ",
+                depth(&mut || sum ^= sample(core::hint::black_box(&material), 3)),
+            );
             tell(b"  stack of the decode digest ", depth(&mut || sum ^= material.decode_digest()[0] as u32));
             let mut total = 0u32;
             for i in 0..64 {

@@ -42,21 +42,36 @@ struct Case {
 
 fn case(count: usize, atoms: usize) -> Case {
     let mut random = Random::new(count as u64);
-    let mut spatial: Vec<(usize, usize)> = (0..atoms).map(|_| (random.range(0, 9) as usize, random.range(0, 9) as usize)).collect();
+    let mut spatial: Vec<(usize, usize)> =
+        (0..atoms).map(|_| (random.range(0, 9) as usize, random.range(0, 9) as usize)).collect();
     spatial.sort_by_key(|&(x, y)| (y, x));
     spatial.dedup();
     let mut terms: Vec<Term> = (0..count)
         .map(|i| {
             let (x, y) = spatial[i * spatial.len() / count];
             // Magnitudes fall as those of measured coefficients do; the first is the largest.
-            let value = (if i == 0 { 30_000.0 } else { 12_000.0 / (i as f64).powf(0.9) }) * if random.once_in(2) { 1.0 } else { -1.0 };
-            let shift = (0..=15u32).rev().find(|s| value.abs() * 2f64.powi(*s as i32) < 32_000.0).expect("some");
+            let value = (if i == 0 { 30_000.0 } else { 12_000.0 / (i as f64).powf(0.9) })
+                * if random.once_in(2) { 1.0 } else { -1.0 };
+            let shift =
+                (0..=15u32).rev().find(|s| value.abs() * 2f64.powi(*s as i32) < 32_000.0).expect("some");
             let short = (value * 2f64.powi(shift as i32)).round() as i32;
-            Term { x, y, light: random.range(0, 31) as usize, view: random.range(0, 31) as usize, shift, short, long: (short << 15) >> shift }
+            Term {
+                x,
+                y,
+                light: random.range(0, 31) as usize,
+                view: random.range(0, 31) as usize,
+                shift,
+                short,
+                long: (short << 15) >> shift,
+            }
         })
         .collect();
     terms.sort_by_key(|t| (t.y, t.x, t.light, t.view));
-    let mut table = |rows: usize| (0..rows * COLUMNS).map(|_| random.range(-32_767, 32_767) as i32 * random.range(1, 8) as i32 / 8).collect();
+    let mut table = |rows: usize| {
+        (0..rows * COLUMNS)
+            .map(|_| random.range(-32_767, 32_767) as i32 * random.range(1, 8) as i32 / 8)
+            .collect()
+    };
     Case { terms, tables: [table(ROWS), table(ROWS), table(EDGE), table(EDGE)] }
 }
 
@@ -64,8 +79,13 @@ fn case(count: usize, atoms: usize) -> Case {
 type Query = [usize; 4];
 
 fn exact(case: &Case, q: Query) -> f64 {
-    let u = |table: usize, row: usize, column: usize| case.tables[table][row * COLUMNS + column] as f64 / 32_768.0;
-    case.terms.iter().map(|t| t.long as f64 * u(0, q[0], t.light) * u(1, q[1], t.view) * u(2, q[2], t.x) * u(3, q[3], t.y)).sum()
+    let u = |table: usize, row: usize, column: usize| {
+        case.tables[table][row * COLUMNS + column] as f64 / 32_768.0
+    };
+    case.terms
+        .iter()
+        .map(|t| t.long as f64 * u(0, q[0], t.light) * u(1, q[1], t.view) * u(2, q[2], t.x) * u(3, q[3], t.y))
+        .sum()
 }
 
 /// Columns of eight queries side by side.
@@ -112,7 +132,9 @@ fn grouped(case: &Case, b: &Blended, term: impl Fn(&Term, &Lanes, &Lanes) -> Lan
 }
 
 fn shared(case: &Case, b: &Blended) -> Lanes {
-    grouped(case, b, |t, l, v| lanes(|i| round_shift(t.short.wrapping_mul((l[i].wrapping_mul(v[i]) + 0x4000) >> 15), t.shift)))
+    grouped(case, b, |t, l, v| {
+        lanes(|i| round_shift(t.short.wrapping_mul((l[i].wrapping_mul(v[i]) + 0x4000) >> 15), t.shift))
+    })
 }
 
 fn nested(case: &Case, b: &Blended) -> Lanes {
@@ -133,7 +155,8 @@ fn flat(case: &Case, b: &Blended) -> Lanes {
 
 /// An order of products for eight queries.
 type Order = fn(&Case, &Blended) -> Lanes;
-const ORDERS: [(&str, Order, &str); 3] = [("shared", shared, SHARED), ("nested", nested, NESTED), ("flat", flat, FLAT)];
+const ORDERS: [(&str, Order, &str); 3] =
+    [("shared", shared, SHARED), ("nested", nested, NESTED), ("flat", flat, FLAT)];
 
 const COMMON: &str = "
 @group(0) @binding(0) var<storage, read> terms: array<vec4<i32>>;
@@ -176,29 +199,69 @@ const FLAT: &str = "
 ";
 
 /// Seconds that a kernel takes for the queries, and its answers.
-fn on_gpu(device: &wgpu::Device, queue: &wgpu::Queue, case: &Case, queries: &[Query], body: &str) -> (f64, Vec<i32>) {
-    let source = if body.contains("@compute") { format!("{COMMON}{body}") } else { format!("{COMMON}{}", GROUPED.replace("TERM", body)) };
-    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: None, source: wgpu::ShaderSource::Wgsl(source.into()) });
-    let descriptor =
-        wgpu::ComputePipelineDescriptor { label: None, layout: None, module: &module, entry_point: None, compilation_options: Default::default(), cache: None };
+fn on_gpu(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    case: &Case,
+    queries: &[Query],
+    body: &str,
+) -> (f64, Vec<i32>) {
+    let source = if body.contains("@compute") {
+        format!("{COMMON}{body}")
+    } else {
+        format!("{COMMON}{}", GROUPED.replace("TERM", body))
+    };
+    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: None,
+        source: wgpu::ShaderSource::Wgsl(source.into()),
+    });
+    let descriptor = wgpu::ComputePipelineDescriptor {
+        label: None,
+        layout: None,
+        module: &module,
+        entry_point: None,
+        compilation_options: Default::default(),
+        cache: None,
+    };
     let pipeline = device.create_compute_pipeline(&descriptor);
-    let terms: Vec<i32> = case.terms.iter().flat_map(|t| [(t.x | t.y << 5 | t.light << 10 | t.view << 15) as i32, t.short, t.long, t.shift as i32]).collect();
-    let starts: Vec<usize> = case.tables.iter().scan(0, |at, t| Some(std::mem::replace(at, *at + t.len()))).collect();
-    let words: Vec<u32> = queries.iter().flat_map(|q| (0..4).map(|i| (starts[i] + q[i] * COLUMNS) as u32)).collect();
+    let terms: Vec<i32> = case
+        .terms
+        .iter()
+        .flat_map(|t| {
+            [(t.x | t.y << 5 | t.light << 10 | t.view << 15) as i32, t.short, t.long, t.shift as i32]
+        })
+        .collect();
+    let starts: Vec<usize> =
+        case.tables.iter().scan(0, |at, t| Some(std::mem::replace(at, *at + t.len()))).collect();
+    let words: Vec<u32> =
+        queries.iter().flat_map(|q| (0..4).map(|i| (starts[i] + q[i] * COLUMNS) as u32)).collect();
     let tables: Vec<i32> = case.tables.concat();
     let make = |contents: &[u8]| {
         let usage = wgpu::BufferUsages::STORAGE;
         device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: None, contents, usage })
     };
     let size = (queries.len() * 4) as u64;
-    let buffer = |usage| device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false });
+    let buffer = |usage| {
+        device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false })
+    };
     let answers = buffer(wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
     let back = buffer(wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ);
-    let inputs = [make(bytemuck::cast_slice(&terms)), make(bytemuck::cast_slice(&tables)), make(bytemuck::cast_slice(&words)), answers.clone()];
-    let entries: Vec<wgpu::BindGroupEntry<'_>> =
-        (0u32..).zip(&inputs).map(|(binding, b)| wgpu::BindGroupEntry { binding, resource: b.as_entire_binding() }).collect();
+    let inputs = [
+        make(bytemuck::cast_slice(&terms)),
+        make(bytemuck::cast_slice(&tables)),
+        make(bytemuck::cast_slice(&words)),
+        answers.clone(),
+    ];
+    let entries: Vec<wgpu::BindGroupEntry<'_>> = (0u32..)
+        .zip(&inputs)
+        .map(|(binding, b)| wgpu::BindGroupEntry { binding, resource: b.as_entire_binding() })
+        .collect();
     let layout = pipeline.get_bind_group_layout(0);
-    let group = device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout: &layout, entries: &entries });
+    let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: None,
+        layout: &layout,
+        entries: &entries,
+    });
     let mut best = f64::MAX;
     for run in 0..6 {
         let begin = Instant::now();
@@ -231,15 +294,25 @@ fn main() {
     let adapter = pollster::block_on(instance.request_adapter(&Default::default())).ok();
     let gpu = adapter.as_ref().map(|a| {
         println!("adapter: {}", a.get_info().name);
-        pollster::block_on(a.request_device(&wgpu::DeviceDescriptor { required_limits: wgpu::Limits::downlevel_defaults(), ..Default::default() }))
-            .expect("device")
+        pollster::block_on(a.request_device(&wgpu::DeviceDescriptor {
+            required_limits: wgpu::Limits::downlevel_defaults(),
+            ..Default::default()
+        }))
+        .expect("device")
     });
     println!("target features: avx2 {}", cfg!(target_feature = "avx2"));
     for (count, atoms) in [(64, 6), (256, 59)] {
         let case = case(count, atoms);
         let mut random = Random::new(1);
         let queries: Vec<Query> = (0..1 << 16)
-            .map(|_| [random.range(0, 150) as usize, random.range(0, 150) as usize, random.range(0, 9) as usize, random.range(0, 9) as usize])
+            .map(|_| {
+                [
+                    random.range(0, 150) as usize,
+                    random.range(0, 150) as usize,
+                    random.range(0, 9) as usize,
+                    random.range(0, 9) as usize,
+                ]
+            })
             .collect();
         let blended: Vec<Blended> = queries[..512].chunks(LANES).map(|q| blend(&case, q)).collect();
         for (name, order, kernel) in ORDERS {

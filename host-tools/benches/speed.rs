@@ -29,7 +29,12 @@ fn rate(per_run: f64, mut run: impl FnMut()) -> String {
         })
         .collect();
     rates.sort_by(f64::total_cmp);
-    format!("{:9.3} M/s  (range {:.3} to {:.3})", rates[RUNS / 2] / 1e6, rates[0] / 1e6, rates[RUNS - 1] / 1e6)
+    format!(
+        "{:9.3} M/s  (range {:.3} to {:.3})",
+        rates[RUNS / 2] / 1e6,
+        rates[0] / 1e6,
+        rates[RUNS - 1] / 1e6
+    )
 }
 
 fn direction(random: &mut Random) -> Direction {
@@ -43,10 +48,18 @@ fn direction(random: &mut Random) -> Direction {
 /// Random queries over the whole image and hemisphere.
 fn queries(seed: u64) -> Vec<FilteredQuery> {
     let mut random = Random::new(seed);
-    (0..1 << 16).map(|_| FilteredQuery { u_q32: random.word(), v_q32: random.word(), light: direction(&mut random), view: direction(&mut random) }).collect()
+    (0..1 << 16)
+        .map(|_| FilteredQuery {
+            u_q32: random.word(),
+            v_q32: random.word(),
+            light: direction(&mut random),
+            view: direction(&mut random),
+        })
+        .collect()
 }
 
-/// Mean operations of the records of a model: for one filtered sample, and for a texel of an image of one channel.
+/// Mean operations of the records of a model: for one filtered sample, and for a texel of an image of one
+/// channel.
 ///
 /// Counted from the records themselves, by what 10.7 multiplies: an unpacked coefficient 1, its two columns 3
 /// each where they change, their product and its own 1 each; a closed spatial atom 4. An image blends and
@@ -70,23 +83,34 @@ fn mean_operations(model: &MaterialModel) -> [f64; 2] {
                 (light, view, x, y) = (atom.light, atom.view, atom.x, atom.y);
             }
             sample += 4.0 * (closed_x + closed_y);
-            image += 2.0 * record.coefficients.len() as f64 + 2.0 * edge * closed_x + 2.0 * edge * edge * closed_y;
+            image +=
+                2.0 * record.coefficients.len() as f64 + 2.0 * edge * closed_x + 2.0 * edge * edge * closed_y;
         }
     }
     // A filtered sample meets (1 + 1/edge)^2 blocks on average; a texel is scaled by one product more.
     [sample / blocks * (1.0 + 1.0 / edge).powi(2), image / blocks / channels / (edge * edge) + 2.0]
 }
 
-/// Filtered RGB samples of an encoded material whose samples meet so many coefficients of each channel in the mean.
+/// Filtered RGB samples of an encoded material whose samples meet so many coefficients of each channel in the
+/// mean.
 fn encoded(folder: &Path, met: [usize; 3]) {
     const EDGE: usize = 16;
     let path = folder.join("cloth.selvset");
     if !path.exists() {
-        let request = Request { kind: Mesostructure::Cloth, size: [64, 64], directions: 81, seed: 1, samples: 1, sample: Sample::Half };
+        let request = Request {
+            kind: Mesostructure::Cloth,
+            size: [64, 64],
+            directions: 81,
+            seed: 1,
+            samples: 1,
+            sample: Sample::Half,
+        };
         synthesise(&request, &path, &|_, _| ()).expect("rendered");
     }
     let data = Dataset::open(&path).expect("just written");
-    let prepared = prepare(vec![&data], TransferModel::Log2 { offset: data.statistics().log_offset() }, &|_, _| ()).expect("readable");
+    let prepared =
+        prepare(vec![&data], TransferModel::Log2 { offset: data.statistics().log_offset() }, &|_, _| ())
+            .expect("readable");
     // A sample meets (1 + 1/edge)^2 blocks in the mean.
     let blocks = (1.0 + 1.0 / EDGE as f64).powi(2);
     let counts = met.map(|n| (n as f64 / blocks).ceil() as usize);
@@ -98,7 +122,11 @@ fn encoded(folder: &Path, met: [usize; 3]) {
     let mut out = vec![Rgb::default(); queries.len()];
     material.sample_batch(&queries, &mut scratch, &mut out).expect("buffers fit");
     for (query, rgb) in queries.iter().zip(&out) {
-        assert_eq!(material.filtered(query.u_q32, query.v_q32, query.light, query.view), *rgb, "the batch is not the plain path");
+        assert_eq!(
+            material.filtered(query.u_q32, query.v_q32, query.light, query.view),
+            *rgb,
+            "the batch is not the plain path"
+        );
     }
     for batch in [8_192, 16_384, 65_536] {
         println!(
@@ -131,7 +159,9 @@ fn main() {
     let material = selvedge::open(&bytes, &Limits::default()).expect("legal");
     let [sample, texel] = mean_operations(&authors.to_model(10).expect("model"));
     println!("{} bytes, {} operations a filtered sample at worst", bytes.len(), material.header().operations);
-    println!("in the mean {sample:.0} operations for the records of a filtered sample, {texel:.1} for a channel texel of an image");
+    println!(
+        "in the mean {sample:.0} operations for the records of a filtered sample, {texel:.1} for a channel texel of an image"
+    );
 
     let queries = queries(7);
     let mut scratch = vec![0; material.batch_scratch_len(queries.len())];
@@ -180,7 +210,14 @@ fn main() {
         material.decode_channel(channel, 0, light, view, &mut scratch, &mut values).expect("buffers fit");
         for (i, value) in values.iter().enumerate() {
             let (x, y) = (i as u32 % width, i as u32 / width);
-            let whole = selvedge::interpolation::texel_values(material.words(), material.material(), x, y, taps.0, taps.1);
+            let whole = selvedge::interpolation::texel_values(
+                material.words(),
+                material.material(),
+                x,
+                y,
+                taps.0,
+                taps.1,
+            );
             assert_eq!([whole.c0, whole.c1, whole.c2][channel], *value, "the image is not the plain path");
         }
     }
@@ -188,7 +225,9 @@ fn main() {
         "whole image, channel texels (two channels)     {}",
         rate(2.0 * texels as f64, || {
             for channel in [1, 2] {
-                material.decode_channel(channel, 0, light, view, &mut scratch, &mut values).expect("buffers fit");
+                material
+                    .decode_channel(channel, 0, light, view, &mut scratch, &mut values)
+                    .expect("buffers fit");
             }
             black_box(&values);
         })

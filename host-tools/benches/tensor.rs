@@ -1,10 +1,11 @@
-//! Speed of the sparse tensor's filtered samples on one core, against 36 separate taps in binary32, after both were compared.
+//! Speed of the sparse tensor's filtered samples on one core, against 36 separate taps in binary32, after
+//! both were compared.
 //!
 //!     RUSTFLAGS="-C target-cpu=x86-64-v3" cargo bench -p selvedge-tools --no-default-features --bench tensor
 //!
-//! The taps are as the paper states them before its section 4.3 merges them: each of four texels times nine pairs of directions evaluates
-//! equation 2 by itself, from the same file's numbers in binary32, with colours side by side. Their directions are located beforehand, which is
-//! in their favour.
+//! The taps are as the paper states them before its section 4.3 merges them: each of four texels times nine
+//! pairs of directions evaluates equation 2 by itself, from the same file's numbers in binary32, with colours
+//! side by side. Their directions are located beforehand, which is in their favour.
 
 use selvedge::position::axis_at_position;
 use selvedge::{Direction, FilteredQuery, Limits, Rgb, Taps};
@@ -66,7 +67,11 @@ impl Floats {
             atoms: tensor.atoms.len(),
             light_atoms: tensor.light_atoms as usize,
             lights: tensor.lights.iter().map(|l| [l[0] as f32, l[1] as f32, l[2] as f32, 0.0]).collect(),
-            fibres: tensor.fibres.iter().map(|&entry| ((entry & mask) as u32, (entry & !mask) as i16 as f32)).collect(),
+            fibres: tensor
+                .fibres
+                .iter()
+                .map(|&entry| ((entry & mask) as u32, (entry & !mask) as i16 as f32))
+                .collect(),
             lists: layer.lists.iter().flat_map(padded).collect(),
             most,
         }
@@ -78,7 +83,8 @@ impl Floats {
         let lights = &self.lights[light as usize * self.light_atoms..][..self.light_atoms];
         let mut sum = [0.0f32; 4];
         for &(atom, coefficient) in &self.lists[texel as usize * self.most..][..self.most] {
-            let fibre = &self.fibres[(view as usize * self.atoms + atom as usize) * self.entries..][..self.entries];
+            let fibre =
+                &self.fibres[(view as usize * self.atoms + atom as usize) * self.entries..][..self.entries];
             let mut angular = [0.0f32; 4];
             for &(index, value) in fibre {
                 let l = lights[index as usize];
@@ -101,7 +107,11 @@ impl Floats {
             for (x, weight_x) in axis(query.u_q32) {
                 for (v, weight_v) in taps(view) {
                     for (l, weight_l) in taps(light) {
-                        let weight = weight_x as f32 * weight_y as f32 * weight_v as f32 * weight_l as f32 * 2f32.powi(-60);
+                        let weight = weight_x as f32
+                            * weight_y as f32
+                            * weight_v as f32
+                            * weight_l as f32
+                            * 2f32.powi(-60);
                         let tap = self.tap(y * self.width + x, l, v);
                         (0..4).for_each(|c| sum[c] += weight * tap[c]);
                     }
@@ -121,7 +131,12 @@ fn direction(random: &mut Random) -> Direction {
 
 fn line(name: &str, rates: &mut [f64]) -> f64 {
     rates.sort_by(f64::total_cmp);
-    println!("{name:44} {:8.3} M/s  (range {:.3} to {:.3})", rates[RUNS / 2] / 1e6, rates[0] / 1e6, rates[RUNS - 1] / 1e6);
+    println!(
+        "{name:44} {:8.3} M/s  (range {:.3} to {:.3})",
+        rates[RUNS / 2] / 1e6,
+        rates[0] / 1e6,
+        rates[RUNS - 1] / 1e6
+    );
     rates[RUNS / 2]
 }
 
@@ -135,9 +150,15 @@ fn measure(data: &Dataset, light_atoms: usize, abrdf_atoms: usize) {
     let floats = Floats::new(&encoded.model);
     let mut random = Random::new(9);
     let queries: Vec<FilteredQuery> = (0..QUERIES)
-        .map(|_| FilteredQuery { u_q32: random.word(), v_q32: random.word(), light: direction(&mut random), view: direction(&mut random) })
+        .map(|_| FilteredQuery {
+            u_q32: random.word(),
+            v_q32: random.word(),
+            light: direction(&mut random),
+            view: direction(&mut random),
+        })
         .collect();
-    let located: Vec<(Taps, Taps)> = queries.iter().map(|q| (material.locate_light(q.light), material.locate_view(q.view))).collect();
+    let located: Vec<(Taps, Taps)> =
+        queries.iter().map(|q| (material.locate_light(q.light), material.locate_view(q.view))).collect();
 
     // Both give the same but for rounding, and the batch the words of the plain path.
     let mut scratch = vec![0; material.batch_scratch_len(queries.len())];
@@ -145,11 +166,16 @@ fn measure(data: &Dataset, light_atoms: usize, abrdf_atoms: usize) {
     material.sample_batch(&queries, &mut scratch, &mut out).expect("buffers fit");
     let (mut worst, mut largest, mut met) = (0.0f64, 0.0f64, 0usize);
     for ((query, rgb), &(light, view)) in queries.iter().zip(&out).zip(&located) {
-        assert_eq!(material.filtered(query.u_q32, query.v_q32, query.light, query.view), *rgb, "the batch is not the plain path");
+        assert_eq!(
+            material.filtered(query.u_q32, query.v_q32, query.light, query.view),
+            *rgb,
+            "the batch is not the plain path"
+        );
         let (words, m) = (material.words(), material.material());
         let axis = |position: u32| axis_at_position(m.edge, m.edge_reciprocal_q18, m.width, position);
         let wanted = floats.filtered(query, light, view);
-        let got = selvedge::tensor::textures_q20(words, m, 0, axis(query.u_q32), axis(query.v_q32), light, view);
+        let got =
+            selvedge::tensor::textures_q20(words, m, 0, axis(query.u_q32), axis(query.v_q32), light, view);
         for (got, wanted) in [got.c0, got.c1, got.c2].into_iter().zip(wanted) {
             worst = worst.max((got as f64 / 1_048_576.0 - wanted as f64).abs());
             largest = largest.max(wanted.abs() as f64);
@@ -158,7 +184,9 @@ fn measure(data: &Dataset, light_atoms: usize, abrdf_atoms: usize) {
         for axis_y in [axis(query.v_q32).first.block, axis(query.v_q32).second.block] {
             for axis_x in [axis(query.u_q32).first.block, axis(query.u_q32).second.block] {
                 let tensor = encoded.model.tensor.as_ref().expect("a tensor");
-                atoms.extend(tensor.lists[0][0].lists[(axis_y * m.width + axis_x) as usize].iter().map(|c| c.0));
+                atoms.extend(
+                    tensor.lists[0][0].lists[(axis_y * m.width + axis_x) as usize].iter().map(|c| c.0),
+                );
             }
         }
         met += atoms.len();
@@ -179,11 +207,22 @@ fn measure(data: &Dataset, light_atoms: usize, abrdf_atoms: usize) {
         };
         timed(0, &mut || material.sample_batch(&queries, &mut scratch, &mut out).expect("buffers fit"));
         black_box(&out);
-        timed(1, &mut || queries.iter().for_each(|q| _ = black_box(material.filtered(q.u_q32, q.v_q32, q.light, q.view))));
-        timed(2, &mut || queries.iter().zip(&located).for_each(|(q, &(light, view))| _ = black_box(floats.filtered(q, light, view))));
+        timed(1, &mut || {
+            queries.iter().for_each(|q| _ = black_box(material.filtered(q.u_q32, q.v_q32, q.light, q.view)))
+        });
+        timed(2, &mut || {
+            queries
+                .iter()
+                .zip(&located)
+                .for_each(|(q, &(light, view))| _ = black_box(floats.filtered(q, light, view)))
+        });
     }
     let [batch, plain, taps] = &mut rates;
-    let (batch, plain, taps) = (line("merged list, batch", batch), line("merged list, one by one", plain), line("36 separate taps in binary32", taps));
+    let (batch, plain, taps) = (
+        line("merged list, batch", batch),
+        line("merged list, one by one", plain),
+        line("36 separate taps in binary32", taps),
+    );
     println!("batch {:.2} times the taps, one by one {:.2} times", batch / taps, plain / taps);
 }
 
@@ -195,7 +234,14 @@ fn main() {
     println!("target features: avx2 {}", cfg!(target_feature = "avx2"));
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("cloth.selvset");
-    let request = Request { kind: Mesostructure::Cloth, size: [64, 64], directions: 81, seed: 1, samples: 1, sample: Sample::Half };
+    let request = Request {
+        kind: Mesostructure::Cloth,
+        size: [64, 64],
+        directions: 81,
+        seed: 1,
+        samples: 1,
+        sample: Sample::Half,
+    };
     synthesise(&request, &path, &|_, _| ()).expect("rendered");
     let data = Dataset::open(&path).expect("just written");
     measure(&data, 128, 128);

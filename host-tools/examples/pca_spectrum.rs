@@ -1,7 +1,9 @@
-//! Prints the rank that principal components need for given errors, from all singular values: a bound in their favour.
+//! Prints the rank that principal components need for given errors, from all singular values: a bound in
+//! their favour.
 //!
-//! `pca_spectrum DATASET RMS...`, where an error is of `ln(x + offset)`, before any rounding of the factors. It holds the whole matrix of
-//! logarithms and the products between its rows in memory (12 bytes for each pair of texels, 4 for each value of the data).
+//! `pca_spectrum DATASET RMS...`, where an error is of `ln(x + offset)`, before any rounding of the factors.
+//! It holds the whole matrix of logarithms and the products between its rows in memory (12 bytes for each
+//! pair of texels, 4 for each value of the data).
 
 use selvedge_tools::dataset::Dataset;
 use selvedge_tools::error::{Result, ToolError};
@@ -46,14 +48,18 @@ fn run(path: &Path, errors: &[f64]) -> Result<()> {
             more
         });
         let rank = rank.count();
-        println!("log RMS {error}: rank {rank}, {} bytes at 8 bits with a scale for each column", columns + 8 + rank * (texels + columns + 8));
+        println!(
+            "log RMS {error}: rank {rank}, {} bytes at 8 bits with a scale for each column",
+            columns + 8 + rank * (texels + columns + 8)
+        );
     }
     Ok(())
 }
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
-    let errors: Option<(String, Vec<f64>)> = arguments.next().zip(arguments.map(|e| e.parse().ok()).collect::<Option<Vec<f64>>>());
+    let errors: Option<(String, Vec<f64>)> =
+        arguments.next().zip(arguments.map(|e| e.parse().ok()).collect::<Option<Vec<f64>>>());
     let Some((path, errors)) = errors else {
         eprintln!("pca_spectrum DATASET RMS...");
         std::process::exit(1);

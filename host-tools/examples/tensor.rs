@@ -1,9 +1,10 @@
 //! The sparse tensor against principal components on a dataset, by sizes of its dictionaries and lists.
 //!
-//! `cargo run --release -p selvedge-tools --example tensor -- DATASET log|linear RANK LIGHT_ATOMS,ABRDF_ATOMS,ENTRIES,COEFFICIENTS ...`
+//! `cargo run --release -p selvedge-tools --example tensor -- DATASET log|linear RANK
+//! LIGHT_ATOMS,ABRDF_ATOMS,ENTRIES,COEFFICIENTS ...`
 //!
-//! For each shape: bytes and error of the file as the core decodes it, the error that was predicted, and the fewest bytes of
-//! principal components at 8 or 16 bits for the same error.
+//! For each shape: bytes and error of the file as the core decodes it, the error that was predicted, and the
+//! fewest bytes of principal components at 8 or 16 bits for the same error.
 
 use selvedge::Limits;
 use selvedge_tools::baseline::pca::{Domain, pca};
@@ -18,10 +19,13 @@ use std::time::Instant;
 fn main() -> Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [path, domain, rank, shapes @ ..] = arguments.as_slice() else {
-        return Err(ToolError::Usage("DATASET log|linear RANK LIGHT_ATOMS,ABRDF_ATOMS,ENTRIES,COEFFICIENTS ...".into()));
+        return Err(ToolError::Usage(
+            "DATASET log|linear RANK LIGHT_ATOMS,ABRDF_ATOMS,ENTRIES,COEFFICIENTS ...".into(),
+        ));
     };
     let domain = if domain == "log" { Domain::Log } else { Domain::Linear };
-    let number = |text: &str| text.parse::<usize>().map_err(|_| ToolError::Usage(format!("`{text}` is no number")));
+    let number =
+        |text: &str| text.parse::<usize>().map_err(|_| ToolError::Usage(format!("`{text}` is no number")));
     let data = Dataset::open(Path::new(path))?;
     let start = Instant::now();
     let mut components = pca(&data, domain, number(rank)?)?;
@@ -34,18 +38,38 @@ fn main() -> Result<()> {
     );
     for shape in shapes {
         let n: Vec<usize> = shape.split(',').map(number).collect::<Result<_>>()?;
-        let [light_atoms, abrdf_atoms, entries, coefficients] = n[..] else { return Err(ToolError::Usage(format!("`{shape}` is no shape"))) };
+        let [light_atoms, abrdf_atoms, entries, coefficients] = n[..] else {
+            return Err(ToolError::Usage(format!("`{shape}` is no shape")));
+        };
         let shape = Shape { light_atoms, abrdf_atoms, entries, coefficients };
         let start = Instant::now();
         let fitted = fit(&components, shape, Training::default(), |_, _, _| ());
         let values = (data.description().texels() * data.description().texel_len()) as f64;
         let rms = |errors: &[f64]| (errors.last().copied().unwrap_or(0.0) / values).sqrt();
         let seconds = start.elapsed().as_secs_f64();
-        println!("{shape:?}: {seconds:.1} s, first K-SVD {:.5}, second {:.5}, {:?}", rms(&fitted.of_texels), rms(&fitted.of_fibres), fitted.trained);
+        println!(
+            "{shape:?}: {seconds:.1} s, first K-SVD {:.5}, second {:.5}, {:?}",
+            rms(&fitted.of_texels),
+            rms(&fitted.of_fibres),
+            fitted.trained
+        );
         let start = Instant::now();
-        let encoded = encode_fit(&components, &fitted, &[], &Options { shape, goal: Goal::All, value_bits: None, training: Training::default() })?;
-        let file = selvedge::open(&encoded.bytes, &Limits::NONE).unwrap_or_else(|finding| panic!("{finding}"));
-        let metrics = compare(Source::Data(&data), Source::File(&file, 0), data.description(), data.statistics().log_offset(), None, &|_, _| ())?;
+        let encoded = encode_fit(
+            &components,
+            &fitted,
+            &[],
+            &Options { shape, goal: Goal::All, value_bits: None, training: Training::default() },
+        )?;
+        let file =
+            selvedge::open(&encoded.bytes, &Limits::NONE).unwrap_or_else(|finding| panic!("{finding}"));
+        let metrics = compare(
+            Source::Data(&data),
+            Source::File(&file, 0),
+            data.description(),
+            data.statistics().log_offset(),
+            None,
+            &|_, _| (),
+        )?;
         let error = if domain == Domain::Log { metrics.log_rms } else { metrics.linear_rms };
         let rival = components.reach(error)?.map_or("-".into(), |choice| {
             format!(

@@ -50,10 +50,15 @@ fn modes(atom: &AtomModel) -> [usize; 4] {
 
 fn columns_of(factor: &FactorModel) -> Vec<Vec<f64>> {
     let count = factor.columns as usize;
-    (0..count).map(|column| factor.entries.iter().skip(column).step_by(count).map(|&entry| entry as f64 / 32_768.0).collect()).collect()
+    (0..count)
+        .map(|column| {
+            factor.entries.iter().skip(column).step_by(count).map(|&entry| entry as f64 / 32_768.0).collect()
+        })
+        .collect()
 }
 
-/// `M b` as a tensor `[y][x][view][light]`, for a product of matrices by mode with `from` columns and `to` rows.
+/// `M b` as a tensor `[y][x][view][light]`, for a product of matrices by mode with `from` columns and `to`
+/// rows.
 fn apply(matrices: &[Matrix; 4], record: &Sparse, from: [usize; 4], to: [usize; 4]) -> Vec<f64> {
     let mut sizes = from;
     let mut tensor = vec![0.0; sizes.iter().product()];
@@ -66,7 +71,10 @@ fn apply(matrices: &[Matrix; 4], record: &Sparse, from: [usize; 4], to: [usize; 
         let outer: usize = sizes[mode + 1..].iter().product();
         let mut next = vec![0.0; inner * to[mode] * outer];
         for block in 0..outer {
-            let (source, target) = (&tensor[block * sizes[mode] * inner..], &mut next[block * to[mode] * inner..][..to[mode] * inner]);
+            let (source, target) = (
+                &tensor[block * sizes[mode] * inner..],
+                &mut next[block * to[mode] * inner..][..to[mode] * inner],
+            );
             for column in 0..sizes[mode] {
                 let source = &source[column * inner..][..inner];
                 if source.iter().all(|&s| s == 0.0) {
@@ -90,15 +98,26 @@ fn form(matrices: &[Matrix; 4], a: &Sparse, b: &Sparse) -> f64 {
     // Coefficient by coefficient for short records; long ones as tensors, a mode at a time.
     let from = matrices.each_ref().map(|m| m.columns);
     let to = matrices.each_ref().map(|m| m.entries.len() / m.columns.max(1));
-    let dense = from.iter().product::<usize>() * to[0] + to[0] * from[1] * from[2] * from[3] * (to[1] + to[2] + to[3]);
+    let dense = from.iter().product::<usize>() * to[0]
+        + to[0] * from[1] * from[2] * from[3] * (to[1] + to[2] + to[3]);
     if a.len() * b.len() > dense {
         let applied = apply(matrices, b, from, to);
-        return a.iter().map(|(p, c)| c * applied[((p.y as usize * to[2] + p.x as usize) * to[1] + p.view as usize) * to[0] + p.light as usize]).sum();
+        return a
+            .iter()
+            .map(|(p, c)| {
+                c * applied[((p.y as usize * to[2] + p.x as usize) * to[1] + p.view as usize) * to[0]
+                    + p.light as usize]
+            })
+            .sum();
     }
     let of = |p: &AtomModel| {
         let [pl, pv, px, py] = modes(p);
         let (rl, rv, rx, ry) = (light.row(pl), view.row(pv), x.row(px), y.row(py));
-        b.iter().map(|(q, c)| c * rx[q.x as usize] * ry[q.y as usize] * rl[q.light as usize] * rv[q.view as usize]).sum::<f64>()
+        b.iter()
+            .map(|(q, c)| {
+                c * rx[q.x as usize] * ry[q.y as usize] * rl[q.light as usize] * rv[q.view as usize]
+            })
+            .sum::<f64>()
     };
     a.iter().map(|(p, c)| c * of(p)).sum()
 }
@@ -167,7 +186,8 @@ impl Orthonormal {
                 }
             }
             let left = dot(&rest, &rest).sqrt();
-            // What is shorter is the rounding of entries to 16 bits; its coefficients would be large and mean nothing.
+            // What is shorter is the rounding of entries to 16 bits; its coefficients would be large and mean
+            // nothing.
             if left > length * 1e-3 {
                 parts.push(left);
                 result.orthonormal.push(rest.iter().map(|rest| rest / left).collect());
@@ -206,19 +226,32 @@ pub struct Change {
 impl Change {
     /// Of coefficients on `other` to coefficients on `target`.
     pub fn new(target: &Basis, other: &Basis) -> Change {
-        let norms: [Vec<f64>; 4] = std::array::from_fn(|mode| (0..target.columns[mode].len()).map(|i| target.gram[mode].at(i, i).sqrt()).collect());
+        let norms: [Vec<f64>; 4] = std::array::from_fn(|mode| {
+            (0..target.columns[mode].len()).map(|i| target.gram[mode].at(i, i).sqrt()).collect()
+        });
         let mut inside: [Matrix; 4] = Default::default();
         let mut weights: [Matrix; 4] = Default::default();
         for mode in 0..4 {
             let (to, from) = (&target.columns[mode], &other.columns[mode]);
             let basis = Orthonormal::new(to);
-            let coordinates: Vec<Vec<f64>> = from.iter().map(|column| basis.orthonormal.iter().map(|q| dot(q, column)).collect()).collect();
+            let coordinates: Vec<Vec<f64>> = from
+                .iter()
+                .map(|column| basis.orthonormal.iter().map(|q| dot(q, column)).collect())
+                .collect();
             inside[mode] = products(&coordinates, &coordinates);
-            let solved: Vec<Vec<f64>> = coordinates.into_iter().map(|coordinates| basis.solve(coordinates, to.len())).collect();
-            let entries = (0..to.len()).flat_map(|row| solved.iter().map(move |column| (row, column[row]))).map(|(row, x)| x * norms[mode][row]);
+            let solved: Vec<Vec<f64>> =
+                coordinates.into_iter().map(|coordinates| basis.solve(coordinates, to.len())).collect();
+            let entries = (0..to.len())
+                .flat_map(|row| solved.iter().map(move |column| (row, column[row])))
+                .map(|(row, x)| x * norms[mode][row]);
             weights[mode] = Matrix { columns: from.len(), entries: entries.collect() };
         }
-        Change { cross: std::array::from_fn(|mode| products(&target.columns[mode], &other.columns[mode])), inside, weights, norms }
+        Change {
+            cross: std::array::from_fn(|mode| products(&target.columns[mode], &other.columns[mode])),
+            inside,
+            weights,
+            norms,
+        }
     }
 
     /// Energy of what the target's span can hold of a record.
@@ -236,22 +269,30 @@ impl Change {
         let mut own_sum: Sparse = own
             .iter()
             .map(|&(atom, value)| {
-                let norm: f64 = modes(&atom).iter().zip(&self.norms).map(|(&column, norms)| norms[column]).product();
+                let norm: f64 =
+                    modes(&atom).iter().zip(&self.norms).map(|(&column, norms)| norms[column]).product();
                 // Where the column is zero nothing can be added.
-                let added = if norm > 0.0 { form(&self.weights, &vec![(atom, 1.0)], other) / norm } else { 0.0 };
+                let added =
+                    if norm > 0.0 { form(&self.weights, &vec![(atom, 1.0)], other) / norm } else { 0.0 };
                 (atom, value + added)
             })
             .collect();
         own_sum.sort_by_key(|(atom, _)| atom.word() >> 4);
-        let is_own = |atom: &AtomModel| own_sum.binary_search_by_key(&(atom.word() >> 4), |(own, _)| own.word() >> 4).is_ok();
-        let more: Sparse = self.largest_projected(other, cap + own.len()).into_iter().filter(|(atom, _)| !is_own(atom)).collect();
+        let is_own = |atom: &AtomModel| {
+            own_sum.binary_search_by_key(&(atom.word() >> 4), |(own, _)| own.word() >> 4).is_ok()
+        };
+        let more: Sparse = self
+            .largest_projected(other, cap + own.len())
+            .into_iter()
+            .filter(|(atom, _)| !is_own(atom))
+            .collect();
         target.sum(&own_sum, &more, cap)
     }
 
     /// The largest coefficients of the projection of a record, by what they contribute.
     ///
-    /// The projection is dense. It is formed mode by mode, x and y first, and a row of lights only if its norm
-    /// leaves room for a coefficient that is large enough.
+    /// The projection is dense. It is formed mode by mode, x and y first, and a row of lights only if its
+    /// norm leaves room for a coefficient that is large enough.
     fn largest_projected(&self, other: &Sparse, count: usize) -> Sparse {
         let [by_light, by_view, by_x, by_y] = &self.weights;
         let [light_norms, view_norms, x_norms, y_norms] = &self.norms;
@@ -260,9 +301,15 @@ impl Change {
         pairs.dedup();
         let mut lights: Vec<u32> = pairs.iter().map(|pair| pair.0).collect();
         lights.dedup();
-        let place_of_light: Vec<usize> = pairs.iter().map(|pair| lights.partition_point(|&light| light < pair.0)).collect();
-        let place_of_pair: Vec<usize> = other.iter().map(|(atom, _)| pairs.partition_point(|&pair| pair < (atom.light, atom.view))).collect();
-        let reach = (0..light_norms.len()).map(|row| dot(by_light.row(row), by_light.row(row)).sqrt()).fold(0.0, f64::max);
+        let place_of_light: Vec<usize> =
+            pairs.iter().map(|pair| lights.partition_point(|&light| light < pair.0)).collect();
+        let place_of_pair: Vec<usize> = other
+            .iter()
+            .map(|(atom, _)| pairs.partition_point(|&pair| pair < (atom.light, atom.view)))
+            .collect();
+        let reach = (0..light_norms.len())
+            .map(|row| dot(by_light.row(row), by_light.row(row)).sqrt())
+            .fold(0.0, f64::max);
 
         let mut best = Largest { count, least: 0.0, list: Vec::new() };
         let mut of_pair = vec![0.0; pairs.len()];
@@ -283,10 +330,20 @@ impl Change {
                 }
                 for (light, &light_norm) in light_norms.iter().enumerate() {
                     let weights = by_light.row(light);
-                    let magnitude: f64 = lights.iter().zip(&of_light).map(|(&light, value)| value * weights[light as usize]).sum();
+                    let magnitude: f64 = lights
+                        .iter()
+                        .zip(&of_light)
+                        .map(|(&light, value)| value * weights[light as usize])
+                        .sum();
                     let norm = light_norm * view_norm * x_norms[x] * y_norms[y];
                     if magnitude.abs() > best.least && norm > 0.0 {
-                        let atom = AtomModel { light: light as u32, view: view as u32, x: x as u32, y: y as u32, ..AtomModel::default() };
+                        let atom = AtomModel {
+                            light: light as u32,
+                            view: view as u32,
+                            x: x as u32,
+                            y: y as u32,
+                            ..AtomModel::default()
+                        };
                         best.push(magnitude.abs(), (atom, magnitude / norm));
                     }
                 }

@@ -14,7 +14,8 @@
 use crate::basis::{Basis, Change, Sparse};
 use crate::error::{Result, ToolError};
 use crate::model::{
-    AtomModel, ChannelModel, CoefficientsModel, DictionaryModel, EnsembleModel, MaterialModel, MetadataModel, PairTableModel, RecordModel, TransferModel,
+    AtomModel, ChannelModel, CoefficientsModel, DictionaryModel, EnsembleModel, MaterialModel, MetadataModel,
+    PairTableModel, RecordModel, TransferModel,
 };
 use crate::quantise::{FloatRecord, quantise, quantise_means, quantise_scales};
 use crate::trim::drop_unused;
@@ -66,7 +67,12 @@ pub struct Report {
 /// [`ToolError::Usage`] if alpha is not 0 to 1, or if the two do not agree in image size, block edge, levels,
 /// directions, channel states, transfer and its offset or exponent, cosine flag and colour matrix; in scales,
 /// unless they are to be blended apart; or if the result is beyond the format.
-pub fn blend(a: &MaterialModel, b: &MaterialModel, alpha: f64, options: Blend) -> Result<(MaterialModel, Report)> {
+pub fn blend(
+    a: &MaterialModel,
+    b: &MaterialModel,
+    alpha: f64,
+    options: Blend,
+) -> Result<(MaterialModel, Report)> {
     if !(0.0..=1.0).contains(&alpha) {
         return Err(ToolError::Usage(format!("alpha is 0 to 1, not {alpha}")));
     }
@@ -75,10 +81,13 @@ pub fn blend(a: &MaterialModel, b: &MaterialModel, alpha: f64, options: Blend) -
         return Ok((if alpha == 0.0 { a } else { b }.clone(), Report::default()));
     }
     let full = a.channels.iter().any(|channel| channel.ensemble.is_some());
-    let layer_count = if options.exact && full { a.layer_count + b.layer_count } else { a.layer_count.max(b.layer_count) };
+    let layer_count =
+        if options.exact && full { a.layer_count + b.layer_count } else { a.layer_count.max(b.layer_count) };
     if layer_count > LAYER_LIMIT {
         let (of_a, of_b) = (a.layer_count, b.layer_count);
-        return Err(ToolError::Usage(format!("an exact blend has the layers of both, {of_a} and {of_b}; a file has room for {LAYER_LIMIT}: trim them first")));
+        return Err(ToolError::Usage(format!(
+            "an exact blend has the layers of both, {of_a} and {of_b}; a file has room for {LAYER_LIMIT}: trim them first"
+        )));
     }
     let mut report = Report::default();
     let mut channels: [ChannelModel; 3] = Default::default();
@@ -88,10 +97,16 @@ pub fn blend(a: &MaterialModel, b: &MaterialModel, alpha: f64, options: Blend) -
         }
         if let (Some(of_a), Some(of_b)) = (&of_a.scale, &of_b.scale) {
             // Q15 in units of 2^shift.
-            channel.scale = Some(blend_tables(of_a, of_b, alpha, |q15| quantise_scales(&q15.iter().map(|q| q / 32_768.0).collect::<Vec<_>>()))?);
+            channel.scale = Some(blend_tables(of_a, of_b, alpha, |q15| {
+                quantise_scales(&q15.iter().map(|q| q / 32_768.0).collect::<Vec<_>>())
+            })?);
         }
         if let (Some(of_a), Some(of_b)) = (&of_a.ensemble, &of_b.ensemble) {
-            let ensemble = if options.exact { side_by_side(of_a, of_b, alpha)? } else { blend_ensembles(of_a, of_b, alpha, options, &mut report)? };
+            let ensemble = if options.exact {
+                side_by_side(of_a, of_b, alpha)?
+            } else {
+                blend_ensembles(of_a, of_b, alpha, options, &mut report)?
+            };
             channel.ensemble = Some(ensemble);
         }
     }
@@ -121,10 +136,16 @@ fn agree(a: &MaterialModel, b: &MaterialModel, options: Blend) -> Result<()> {
         (states(a) == states(b), "channel states: trim a texture or a channel that only one has"),
         (kind(a) == kind(b), "transfers: both must be log2 or linear"),
         (a.transfer == b.transfer, "log offsets or exponents: encode both with the same"),
-        (a.cosine_included == b.cosine_included, "cosine flags: both must have the light's cosine in, or both not"),
+        (
+            a.cosine_included == b.cosine_included,
+            "cosine flags: both must have the light's cosine in, or both not",
+        ),
         (a.matrix_q13 == b.matrix_q13, "colour matrices: encode both with the same channels"),
         (scales(a) == scales(b), "scales: only one of them has a table; encode both with or without"),
-        (same_scales || options.scales_apart, "scales: values do not blend linearly; blend textures and scales apart, or encode both without scales"),
+        (
+            same_scales || options.scales_apart,
+            "scales: values do not blend linearly; blend textures and scales apart, or encode both without scales",
+        ),
     ];
     match rules.iter().find(|(holds, _)| !holds) {
         Some((_, what)) => Err(ToolError::Usage(format!("the two materials differ in their {what}"))),
@@ -132,12 +153,24 @@ fn agree(a: &MaterialModel, b: &MaterialModel, options: Blend) -> Result<()> {
     }
 }
 
-fn blend_tables(a: &PairTableModel, b: &PairTableModel, alpha: f64, quantise: impl Fn(&[f64]) -> Result<PairTableModel>) -> Result<PairTableModel> {
+fn blend_tables(
+    a: &PairTableModel,
+    b: &PairTableModel,
+    alpha: f64,
+    quantise: impl Fn(&[f64]) -> Result<PairTableModel>,
+) -> Result<PairTableModel> {
     if a == b {
         return Ok(a.clone());
     }
-    let value = |table: &PairTableModel, entry: i16| entry as f64 * 2f64.powi(table.shift as i32) + table.base_q20 as f64;
-    let blended: Vec<f64> = a.entries.iter().zip(&b.entries).map(|(&p, &q)| (1.0 - alpha) * value(a, p) + alpha * value(b, q)).collect();
+    let value = |table: &PairTableModel, entry: i16| {
+        entry as f64 * 2f64.powi(table.shift as i32) + table.base_q20 as f64
+    };
+    let blended: Vec<f64> = a
+        .entries
+        .iter()
+        .zip(&b.entries)
+        .map(|(&p, &q)| (1.0 - alpha) * value(a, p) + alpha * value(b, q))
+        .collect();
     quantise(&blended)
 }
 
@@ -149,7 +182,13 @@ fn blend_metadata(a: &MetadataModel, b: &MetadataModel) -> MetadataModel {
         frame: either(a.frame, b.frame),
         image_origin: either(a.image_origin, b.image_origin),
         primaries: either(a.primaries, b.primaries),
-        texts: std::array::from_fn(|i| if a.texts[i] == b.texts[i] { a.texts[i].clone() } else { format!("{}; {}", a.texts[i], b.texts[i]) }),
+        texts: std::array::from_fn(|i| {
+            if a.texts[i] == b.texts[i] {
+                a.texts[i].clone()
+            } else {
+                format!("{}; {}", a.texts[i], b.texts[i])
+            }
+        }),
     }
 }
 
@@ -160,14 +199,25 @@ fn float_record(ensemble: &EnsembleModel, record: &RecordModel, value_bits: u32,
         let coefficient = dequantise(atom.quantiser(), value as u32, value_bits);
         coefficient as f64 * weight * 2f64.powi(-((record.shift + 5 + atom.shift) as i32))
     };
-    let list = record.coefficients.iter().map(|&(position, v)| (atoms[position as usize], value(&atoms[position as usize], v)));
+    let list = record
+        .coefficients
+        .iter()
+        .map(|&(position, v)| (atoms[position as usize], value(&atoms[position as usize], v)));
     (record.dictionary as usize, list.collect())
 }
 
 /// Float records of a layer, or empty ones for a layer that is not there.
-fn float_layer(ensemble: &EnsembleModel, level: usize, layer: usize, weight: f64, blocks: usize) -> Vec<FloatRecord> {
+fn float_layer(
+    ensemble: &EnsembleModel,
+    level: usize,
+    layer: usize,
+    weight: f64,
+    blocks: usize,
+) -> Vec<FloatRecord> {
     match ensemble.coefficients[level].get(layer) {
-        Some(c) => c.records.iter().map(|record| float_record(ensemble, record, c.value_bits, weight)).collect(),
+        Some(c) => {
+            c.records.iter().map(|record| float_record(ensemble, record, c.value_bits, weight)).collect()
+        }
         None => vec![(0, Vec::new()); blocks],
     }
 }
@@ -179,7 +229,13 @@ struct Pair {
 }
 
 /// Equations 7 to 9 for one channel.
-fn blend_ensembles(a: &EnsembleModel, b: &EnsembleModel, alpha: f64, options: Blend, report: &mut Report) -> Result<EnsembleModel> {
+fn blend_ensembles(
+    a: &EnsembleModel,
+    b: &EnsembleModel,
+    alpha: f64,
+    options: Blend,
+    report: &mut Report,
+) -> Result<EnsembleModel> {
     // Dictionaries of both, those of b that a has as well but once.
     let mut dictionaries: Vec<&DictionaryModel> = a.dictionaries.iter().collect();
     let number_of_b: Vec<usize> = b
@@ -195,27 +251,43 @@ fn blend_ensembles(a: &EnsembleModel, b: &EnsembleModel, alpha: f64, options: Bl
     let bases: Vec<Basis> = dictionaries.par_iter().map(|dictionary| Basis::new(dictionary)).collect();
     let pairs: Vec<Vec<Vec<Pair>>> = (0..a.coefficients.len())
         .map(|level| {
-            let blocks = a.coefficients[level].iter().chain(&b.coefficients[level]).map(|layer| layer.records.len()).max().unwrap_or(0);
+            let blocks = a.coefficients[level]
+                .iter()
+                .chain(&b.coefficients[level])
+                .map(|layer| layer.records.len())
+                .max()
+                .unwrap_or(0);
             let layers = a.coefficients[level].len().max(b.coefficients[level].len());
             let of_layer = |layer: usize| {
                 let of_a = float_layer(a, level, layer, 1.0 - alpha, blocks);
                 let of_b = float_layer(b, level, layer, alpha, blocks);
-                of_a.into_par_iter().zip(of_b).map(|(of_a, of_b)| pair_of(&bases, of_a, (number_of_b[of_b.0], of_b.1))).collect()
+                of_a.into_par_iter()
+                    .zip(of_b)
+                    .map(|(of_a, of_b)| pair_of(&bases, of_a, (number_of_b[of_b.0], of_b.1)))
+                    .collect()
             };
             (0..layers).map(of_layer).collect()
         })
         .collect();
-    let mut changes: Vec<(usize, usize)> =
-        pairs.iter().flatten().flatten().filter(|pair| needs_change(pair)).map(|pair| (pair.target.0, pair.other.0)).collect();
+    let mut changes: Vec<(usize, usize)> = pairs
+        .iter()
+        .flatten()
+        .flatten()
+        .filter(|pair| needs_change(pair))
+        .map(|pair| (pair.target.0, pair.other.0))
+        .collect();
     changes.sort_unstable();
     changes.dedup();
-    let changes: BTreeMap<(usize, usize), Change> =
-        changes.into_par_iter().map(|(target, other)| ((target, other), Change::new(&bases[target], &bases[other]))).collect();
+    let changes: BTreeMap<(usize, usize), Change> = changes
+        .into_par_iter()
+        .map(|(target, other)| ((target, other), Change::new(&bases[target], &bases[other])))
+        .collect();
     let mut records = Vec::with_capacity(pairs.len());
     for level in pairs {
         let mut of_level = Vec::with_capacity(level.len());
         for layer in level {
-            let blended: Vec<(FloatRecord, Report)> = layer.into_par_iter().map(|pair| blend_pair(&bases, &changes, pair, options)).collect();
+            let blended: Vec<(FloatRecord, Report)> =
+                layer.into_par_iter().map(|pair| blend_pair(&bases, &changes, pair, options)).collect();
             for (_, part) in &blended {
                 report.summed += part.summed;
                 report.changed += part.changed;
@@ -228,10 +300,15 @@ fn blend_ensembles(a: &EnsembleModel, b: &EnsembleModel, alpha: f64, options: Bl
         records.push(of_level);
     }
     let bits = |level: usize, layer: usize| {
-        let there = [a, b].map(|ensemble| ensemble.coefficients[level].get(layer).map_or(0, |c| c.value_bits));
+        let there =
+            [a, b].map(|ensemble| ensemble.coefficients[level].get(layer).map_or(0, |c| c.value_bits));
         options.value_bits.unwrap_or(there[0].max(there[1]))
     };
-    let bits: Vec<Vec<u32>> = records.iter().enumerate().map(|(level, layers)| (0..layers.len()).map(|layer| bits(level, layer)).collect()).collect();
+    let bits: Vec<Vec<u32>> = records
+        .iter()
+        .enumerate()
+        .map(|(level, layers)| (0..layers.len()).map(|layer| bits(level, layer)).collect())
+        .collect();
     let (atoms, coefficients) = quantise(&records, dictionaries.len(), &bits)?;
     let dictionaries = dictionaries.into_iter().cloned().collect();
     within_limit(EnsembleModel { dictionaries, atoms, coefficients })
@@ -241,7 +318,10 @@ fn blend_ensembles(a: &EnsembleModel, b: &EnsembleModel, alpha: f64, options: Bl
 fn within_limit(mut ensemble: EnsembleModel) -> Result<EnsembleModel> {
     drop_unused(&mut ensemble);
     if ensemble.dictionaries.len() > DICTIONARY_LIMIT as usize {
-        return Err(ToolError::Usage(format!("the blend would have {} dictionaries; a file has room for {DICTIONARY_LIMIT}", ensemble.dictionaries.len())));
+        return Err(ToolError::Usage(format!(
+            "the blend would have {} dictionaries; a file has room for {DICTIONARY_LIMIT}",
+            ensemble.dictionaries.len()
+        )));
     }
     Ok(ensemble)
 }
@@ -249,14 +329,23 @@ fn within_limit(mut ensemble: EnsembleModel) -> Result<EnsembleModel> {
 /// The record with more energy gives the dictionary, that of the first material where they are equal.
 fn pair_of(bases: &[Basis], a: FloatRecord, b: FloatRecord) -> Pair {
     let alike = a.0 == b.0 || b.1.is_empty();
-    if !a.1.is_empty() && (alike || bases[a.0].energy(&a.1) >= bases[b.0].energy(&b.1)) { Pair { target: a, other: b } } else { Pair { target: b, other: a } }
+    if !a.1.is_empty() && (alike || bases[a.0].energy(&a.1) >= bases[b.0].energy(&b.1)) {
+        Pair { target: a, other: b }
+    } else {
+        Pair { target: b, other: a }
+    }
 }
 
 fn needs_change(pair: &Pair) -> bool {
     pair.target.0 != pair.other.0 && !pair.other.1.is_empty()
 }
 
-fn blend_pair(bases: &[Basis], changes: &BTreeMap<(usize, usize), Change>, pair: Pair, options: Blend) -> (FloatRecord, Report) {
+fn blend_pair(
+    bases: &[Basis],
+    changes: &BTreeMap<(usize, usize), Change>,
+    pair: Pair,
+    options: Blend,
+) -> (FloatRecord, Report) {
     let Pair { target: (k, own), other: (p, other) } = pair;
     let basis = &bases[k];
     let most = options.most.map_or(own.len() + other.len(), |most| most as usize).min(COUNT_LIMIT);
@@ -291,7 +380,13 @@ fn side_by_side(a: &EnsembleModel, b: &EnsembleModel, alpha: f64) -> Result<Ense
         *ensemble = weigh(ensemble, weight)?;
     }
     let first_of_b = a.dictionaries.len() as u32;
-    for record in b.coefficients.iter_mut().flatten().flat_map(|layer| &mut layer.records).filter(|record| !record.coefficients.is_empty()) {
+    for record in b
+        .coefficients
+        .iter_mut()
+        .flatten()
+        .flat_map(|layer| &mut layer.records)
+        .filter(|record| !record.coefficients.is_empty())
+    {
         record.dictionary += first_of_b;
     }
     let in_turn = |(a, b): (Vec<CoefficientsModel>, Vec<CoefficientsModel>)| {
@@ -310,15 +405,33 @@ fn side_by_side(a: &EnsembleModel, b: &EnsembleModel, alpha: f64) -> Result<Ense
     })
 }
 
-/// A weight of at most one times an ensemble: powers of two in the shifts of records, the rest in the quantisers.
+/// A weight of at most one times an ensemble: powers of two in the shifts of records, the rest in the
+/// quantisers.
 fn weigh(ensemble: &EnsembleModel, weight: f64) -> Result<EnsembleModel> {
-    let records = || ensemble.coefficients.iter().flatten().flat_map(|layer| &layer.records).filter(|record| !record.coefficients.is_empty());
+    let records = || {
+        ensemble
+            .coefficients
+            .iter()
+            .flatten()
+            .flat_map(|layer| &layer.records)
+            .filter(|record| !record.coefficients.is_empty())
+    };
     let room = 31 - records().map(|record| record.shift).max().unwrap_or(31);
     let halvings = (-weight.log2()).floor().clamp(0.0, room as f64) as u32;
     for halvings in (0..=halvings).rev() {
         let mut weighted = ensemble.clone();
-        weighted.atoms.iter_mut().flatten().for_each(|atom| *atom = weighted_atom(*atom, weight * 2f64.powi(halvings as i32)));
-        for record in weighted.coefficients.iter_mut().flatten().flat_map(|layer| &mut layer.records).filter(|record| !record.coefficients.is_empty()) {
+        weighted
+            .atoms
+            .iter_mut()
+            .flatten()
+            .for_each(|atom| *atom = weighted_atom(*atom, weight * 2f64.powi(halvings as i32)));
+        for record in weighted
+            .coefficients
+            .iter_mut()
+            .flatten()
+            .flat_map(|layer| &mut layer.records)
+            .filter(|record| !record.coefficients.is_empty())
+        {
             record.shift += halvings;
         }
         if sums_fit(&weighted) {
@@ -326,9 +439,16 @@ fn weigh(ensemble: &EnsembleModel, weight: f64) -> Result<EnsembleModel> {
         }
     }
     // Rounding takes a record that is full to the brim over it: values are quantised anew.
-    let of_layer = |layer: &CoefficientsModel| layer.records.iter().map(|record| float_record(ensemble, record, layer.value_bits, weight)).collect();
-    let records: Vec<Vec<Vec<FloatRecord>>> = ensemble.coefficients.iter().map(|level| level.iter().map(of_layer).collect()).collect();
-    let bits: Vec<Vec<u32>> = ensemble.coefficients.iter().map(|level| level.iter().map(|layer| layer.value_bits).collect()).collect();
+    let of_layer = |layer: &CoefficientsModel| {
+        layer.records.iter().map(|record| float_record(ensemble, record, layer.value_bits, weight)).collect()
+    };
+    let records: Vec<Vec<Vec<FloatRecord>>> =
+        ensemble.coefficients.iter().map(|level| level.iter().map(of_layer).collect()).collect();
+    let bits: Vec<Vec<u32>> = ensemble
+        .coefficients
+        .iter()
+        .map(|level| level.iter().map(|layer| layer.value_bits).collect())
+        .collect();
     let (atoms, coefficients) = quantise(&records, ensemble.dictionaries.len(), &bits)?;
     Ok(EnsembleModel { dictionaries: ensemble.dictionaries.clone(), atoms, coefficients })
 }
@@ -341,16 +461,26 @@ fn weighted_atom(atom: AtomModel, weight: f64) -> AtomModel {
     let gain = 2f64.powi((shift - atom.shift) as i32);
     let new_base = (base * gain).round() as i16;
     let room = (32_767 - new_base as i32).min(65_535) as f64;
-    AtomModel { shift, base: new_base, step: (atom.step as f64 * weight * gain).round().min(room) as u16, ..atom }
+    AtomModel {
+        shift,
+        base: new_base,
+        step: (atom.step as f64 * weight * gain).round().min(room) as u16,
+        ..atom
+    }
 }
 
 /// Rule 10.7-7.
 fn sums_fit(ensemble: &EnsembleModel) -> bool {
-    let part = |atom: AtomModel, value: u16, bits: u32| dequantise(atom.quantiser(), value as u32, bits).unsigned_abs().div_ceil(1 << atom.shift);
+    let part = |atom: AtomModel, value: u16, bits: u32| {
+        dequantise(atom.quantiser(), value as u32, bits).unsigned_abs().div_ceil(1 << atom.shift)
+    };
     ensemble.coefficients.iter().flatten().all(|layer| {
         layer.records.iter().all(|record| {
             let atoms = &ensemble.atoms[record.dictionary as usize];
-            let parts = record.coefficients.iter().map(|&(position, value)| part(atoms[position as usize], value, layer.value_bits));
+            let parts = record
+                .coefficients
+                .iter()
+                .map(|&(position, value)| part(atoms[position as usize], value, layer.value_bits));
             parts.sum::<u32>() <= SUM_LIMIT
         })
     })

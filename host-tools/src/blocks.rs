@@ -1,8 +1,8 @@
 //! Blocks of a dataset as training and encoding see them, and the one pass that comes before: means and
 //! second moments.
 //!
-//! A block is `edge x edge` texels with all pairs of directions: for each channel a tensor `[y][x][view][light]`.
-//! Texels beyond the image repeat its last ones; no decoder ever reads them.
+//! A block is `edge x edge` texels with all pairs of directions: for each channel a tensor
+//! `[y][x][view][light]`. Texels beyond the image repeat its last ones; no decoder ever reads them.
 
 use crate::dataset::Dataset;
 use crate::error::Result;
@@ -56,7 +56,9 @@ impl Blocks<'_> {
         for y in 0..edge {
             if top + y >= height {
                 // Repeats the row above.
-                out.iter_mut().for_each(|plane| plane.copy_within((y - 1) * edge * pairs..y * edge * pairs, y * edge * pairs));
+                out.iter_mut().for_each(|plane| {
+                    plane.copy_within((y - 1) * edge * pairs..y * edge * pairs, y * edge * pairs)
+                });
                 continue;
             }
             self.dataset.read((top + y) * width + left, inside, &mut scratch.bytes, &mut scratch.run)?;
@@ -64,9 +66,12 @@ impl Blocks<'_> {
                 let texel = &scratch.run[x.min(inside - 1) * pairs * 3..][..pairs * 3];
                 let at = (y * edge + x) * pairs;
                 let [c0, c1, c2] = &mut *out;
-                let planes = c0[at..at + pairs].iter_mut().zip(&mut c1[at..at + pairs]).zip(&mut c2[at..at + pairs]);
+                let planes =
+                    c0[at..at + pairs].iter_mut().zip(&mut c1[at..at + pairs]).zip(&mut c2[at..at + pairs]);
                 let means = self.means[0].iter().zip(&self.means[1]).zip(&self.means[2]);
-                for ((((p0, p1), p2), &rgb), ((m0, m1), m2)) in planes.zip(texel.as_chunks::<3>().0).zip(means) {
+                for ((((p0, p1), p2), &rgb), ((m0, m1), m2)) in
+                    planes.zip(texel.as_chunks::<3>().0).zip(means)
+                {
                     let [v0, v1, v2] = self.forward.channels(rgb);
                     (*p0, *p1, *p2) = (v0 - m0, v1 - m1, v2 - m2);
                 }
@@ -81,7 +86,8 @@ impl Blocks<'_> {
 pub struct Moments {
     /// Mean for each pair, `[view * lights + light]`.
     pub means: [Vec<f64>; 3],
-    /// Second moments between lights, summed over texels and views, of values less their means: `[lights][lights]`.
+    /// Second moments between lights, summed over texels and views, of values less their means:
+    /// `[lights][lights]`.
     pub lights: [Vec<f64>; 3],
     /// The same between views.
     pub views: [Vec<f64>; 3],
@@ -113,7 +119,9 @@ pub fn moments(dataset: &Dataset, forward: Forward, progress: &dyn Fn(usize, usi
         let (mut by_light, mut by_view): ([Vec<f32>; 3], [Vec<f32>; 3]) = Default::default();
         for c in 0..3 {
             sums[c] = vec![0.0; pairs];
-            planes[c].chunks(pairs).for_each(|texel| sums[c].iter_mut().zip(texel).for_each(|(sum, &v)| *sum += v as f64));
+            planes[c]
+                .chunks(pairs)
+                .for_each(|texel| sums[c].iter_mut().zip(texel).for_each(|(sum, &v)| *sum += v as f64));
             by_light[c] = vec![0.0; lights * lights];
             product_at(&mut by_light[c], &planes[c], &planes[c], [lights, count * views, lights], false);
             by_view[c] = vec![0.0; views * views];
@@ -131,7 +139,8 @@ pub fn moments(dataset: &Dataset, forward: Forward, progress: &dyn Fn(usize, usi
     }
     let parts = texels.div_ceil(batch);
     let mut total = ordered(parts, part, total, |total, i, (sums, by_light, by_view)| {
-        let add = |into: &mut Vec<f64>, from: &[f32]| into.iter_mut().zip(from).for_each(|(a, &b)| *a += b as f64);
+        let add =
+            |into: &mut Vec<f64>, from: &[f32]| into.iter_mut().zip(from).for_each(|(a, &b)| *a += b as f64);
         for c in 0..3 {
             total.means[c].iter_mut().zip(&sums[c]).for_each(|(a, b)| *a += b);
             add(&mut total.lights[c], &by_light[c]);

@@ -1,11 +1,16 @@
 //! Counts what a filtered sample costs, by walking it: the multiplications of values that 4.2 prices.
 //!
-//! The walk uses the core's own parts and follows the plain path step by step; it gives the values too, so that a walk which strays
-//! from the decoder is found out. Prices are those of the steps that are taken, where the file states those of the worst sample.
+//! The walk uses the core's own parts and follows the plain path step by step; it gives the values too, so
+//! that a walk which strays from the decoder is found out. Prices are those of the steps that are taken,
+//! where the file states those of the worst sample.
 
 use crate::read::RecordTables;
-use selvedge::direction::{clamp_direction, coarse_q14, cross, grid_cell, grid_start, point, triangles_start};
-use selvedge::ensemble::{RECORD_BOUND, Record, blend_column, blend_span, coefficients_start, dequantise, read_record};
+use selvedge::direction::{
+    clamp_direction, coarse_q14, cross, grid_cell, grid_start, point, triangles_start,
+};
+use selvedge::ensemble::{
+    RECORD_BOUND, Record, blend_column, blend_span, coefficients_start, dequantise, read_record,
+};
 use selvedge::fixed::{clamp_magnitude, multiply_q15, round_shift};
 use selvedge::interpolation::{VALUE_BOUND, mean_q20, scale_q15, scale_texture};
 use selvedge::material::{CHANNEL_FULL, CHANNEL_MISSING, Channel, METHOD_SPARSE_TENSOR, level_size};
@@ -23,12 +28,20 @@ pub struct Counted {
 }
 
 /// Walks a filtered sample of one level.
-pub fn filtered(material: &Selvedge<'_>, level: u32, u_q32: u32, v_q32: u32, light: Direction, view: Direction) -> Counted {
+pub fn filtered(
+    material: &Selvedge<'_>,
+    level: u32,
+    u_q32: u32,
+    v_q32: u32,
+    light: Direction,
+    view: Direction,
+) -> Counted {
     let (words, m) = (material.words(), material.material());
     let mut operations = 18;
     operations += locate(material, m.light_start, light) + locate(material, m.view_start, view);
     let (light, view) = (material.locate_light(light), material.locate_view(view));
-    let axis = |size: u32, at: u32| axis_at_position(m.edge, m.edge_reciprocal_q18, level_size(size, level), at);
+    let axis =
+        |size: u32, at: u32| axis_at_position(m.edge, m.edge_reciprocal_q18, level_size(size, level), at);
     let (x, y) = (axis(m.width, u_q32), axis(m.height, v_q32));
     let mut given = [0i32; 3];
     if m.method == METHOD_SPARSE_TENSOR && m.full_count > 0 {
@@ -38,14 +51,17 @@ pub fn filtered(material: &Selvedge<'_>, level: u32, u_q32: u32, v_q32: u32, lig
         }
     }
     let mut given = given.into_iter();
-    let spans = |axis: selvedge::position::Axis| if axis.count == 2 { vec![axis.first, axis.second] } else { vec![axis.first] };
+    let spans = |axis: selvedge::position::Axis| {
+        if axis.count == 2 { vec![axis.first, axis.second] } else { vec![axis.first] }
+    };
     let values = m.channels.map(|channel| {
         let mut texture = given.next().unwrap_or(0);
         if channel.state == CHANNEL_MISSING {
             return 0;
         }
         let mean = mean_q20(words, m, channel, light, view);
-        // Three rows of three products, then three products of rows: twelve, and three for the table's base and shift.
+        // Three rows of three products, then three products of rows: twelve, and three for the table's base
+        // and shift.
         operations += 15;
         if channel.state != CHANNEL_FULL {
             return clamp_magnitude(mean, VALUE_BOUND);
@@ -55,16 +71,30 @@ pub fn filtered(material: &Selvedge<'_>, level: u32, u_q32: u32, v_q32: u32, lig
             for span_x in spans(x) {
                 let block = span_y.block * block_count(m, level_size(m.width, level)) + span_x.block;
                 for layer in 0..m.layer_limit {
-                    let record = read_record(words, coefficients_start(words, m, channel, level, layer), block);
+                    let record =
+                        read_record(words, coefficients_start(words, m, channel, level, layer), block);
                     if record.count > 0 {
-                        texture = texture.wrapping_add(walk_record(material, channel, record, span_x, span_y, light, view, &mut operations));
+                        texture = texture.wrapping_add(walk_record(
+                            material,
+                            channel,
+                            record,
+                            span_x,
+                            span_y,
+                            light,
+                            view,
+                            &mut operations,
+                        ));
                     }
                 }
             }
         }
         if channel.scale_start != 0 {
             operations += 17;
-            texture = scale_texture(texture, scale_q15(words, m, channel, light, view), word(words, channel.scale_start + 1));
+            texture = scale_texture(
+                texture,
+                scale_q15(words, m, channel, light, view),
+                word(words, channel.scale_start + 1),
+            );
         }
         clamp_magnitude(texture.wrapping_add(mean), VALUE_BOUND)
     });
@@ -74,7 +104,15 @@ pub fn filtered(material: &Selvedge<'_>, level: u32, u_q32: u32, v_q32: u32, lig
 }
 
 /// A layer of a sparse tensor, step by step as 12.5 goes, by maps instead of a merge of lists.
-fn walk_layer(material: &Selvedge<'_>, level: u32, layer: u32, axes: [selvedge::position::Axis; 2], light: Taps, view: Taps, operations: &mut u64) -> [i32; 3] {
+fn walk_layer(
+    material: &Selvedge<'_>,
+    level: u32,
+    layer: u32,
+    axes: [selvedge::position::Axis; 2],
+    light: Taps,
+    view: Taps,
+    operations: &mut u64,
+) -> [i32; 3] {
     let (words, m) = (material.words(), material.material());
     let start = lists_start(words, m, level, layer);
     let (atom_count, shape) = (word(words, m.fibres_start), word(words, m.fibres_start + 1));
@@ -100,16 +138,29 @@ fn walk_layer(material: &Selvedge<'_>, level: u32, layer: u32, axes: [selvedge::
     let (entries, mask) = (shape & 0xff, (1u32 << (shape >> 8 & 0xff)) - 1);
     for (atom, weight) in weights {
         let mut sums = [0i32; 3];
-        for (view, weight) in [(view.a, view.weight_a_q15), (view.b, view.weight_b_q15), (view.c, view.weight_c_q15)] {
+        for (view, weight) in
+            [(view.a, view.weight_a_q15), (view.b, view.weight_b_q15), (view.c, view.weight_c_q15)]
+        {
             for n in 0..entries {
-                let entry = packed_i16(words, m.fibres_start + 2 + atom_count, (view * atom_count + atom) * entries + n) as u32 & 0xffff;
+                let entry = packed_i16(
+                    words,
+                    m.fibres_start + 2 + atom_count,
+                    (view * atom_count + atom) * entries + n,
+                ) as u32
+                    & 0xffff;
                 let (index, value) = (entry & mask, (entry & !mask) as u16 as i16 as i32);
                 // The entry's weight, three channels of three lights, and three products.
                 *operations += 13;
                 let h = (value * weight + (1 << 16)) >> 17;
                 for (c, sum) in sums.iter_mut().enumerate() {
-                    let at = |light: u32, weight: i32| ((word(words, row(light) + index) << (22 - c * 10)) as i32 >> 22) * weight;
-                    let u = (at(light.a, light.weight_a_q15) + at(light.b, light.weight_b_q15) + at(light.c, light.weight_c_q15) + 512) >> 10;
+                    let at = |light: u32, weight: i32| {
+                        ((word(words, row(light) + index) << (22 - c * 10)) as i32 >> 22) * weight
+                    };
+                    let u = (at(light.a, light.weight_a_q15)
+                        + at(light.b, light.weight_b_q15)
+                        + at(light.c, light.weight_c_q15)
+                        + 512)
+                        >> 10;
                     *sum += h * u;
                 }
             }
@@ -156,14 +207,25 @@ pub fn locate(material: &Selvedge<'_>, start: u32, direction: Direction) -> u64 
 
 /// One record, step by step as 10.7 goes.
 #[allow(clippy::too_many_arguments, reason = "those of its twin in the core, and the count")]
-fn walk_record(material: &Selvedge<'_>, channel: Channel, record: Record, x: Span, y: Span, light: Taps, view: Taps, operations: &mut u64) -> i32 {
+fn walk_record(
+    material: &Selvedge<'_>,
+    channel: Channel,
+    record: Record,
+    x: Span,
+    y: Span,
+    light: Taps,
+    view: Taps,
+    operations: &mut u64,
+) -> i32 {
     let words = material.words();
-    let RecordTables { light: light_table, view: view_table, x: x_table, y: y_table, atoms } = RecordTables::of(words, channel, record.dictionary);
+    let RecordTables { light: light_table, view: view_table, x: x_table, y: y_table, atoms } =
+        RecordTables::of(words, channel, record.dictionary);
     let field_bits = record.low_bits + record.value_bits;
     let (mut total, mut sum_y, mut sum_xy) = (0i32, 0i32, 0i32);
     let (mut at_x, mut at_y) = (0, 0);
     let (mut bit, mut high) = (record.highs_bit, 0);
-    // A close of the sum over x, or of that over y: two products to blend the column, two to multiply by it in halves.
+    // A close of the sum over x, or of that over y: two products to blend the column, two to multiply by it
+    // in halves.
     let mut close = |sum: i32, u: i32| {
         *operations += 4;
         multiply_q15(sum, u)
@@ -198,7 +260,10 @@ fn walk_record(material: &Selvedge<'_>, channel: Channel, record: Record, x: Spa
         let u_light = blend_column(words, light_table.0, light_table.1, light, atom >> 14 & 0x3ff);
         let u_view = blend_column(words, view_table.0, view_table.1, view, atom >> 4 & 0x3ff);
         let u_angular = u_light.wrapping_mul(u_view).wrapping_add(1 << 14) >> 15;
-        sum_xy = sum_xy.wrapping_add(round_shift(dequantise(quantiser, value, record.value_bits).wrapping_mul(u_angular), atom & 0xf));
+        sum_xy = sum_xy.wrapping_add(round_shift(
+            dequantise(quantiser, value, record.value_bits).wrapping_mul(u_angular),
+            atom & 0xf,
+        ));
         // Dequantised, blended twice by three, multiplied with each other and with the coefficient.
         of_coefficients += 9;
     }

@@ -111,12 +111,17 @@ impl Description {
             if set.is_empty() || set.len() > directions {
                 return Err(format!("{} {name} directions; 1 to {directions} are possible", set.len()));
             }
-            if let Some(i) = set.iter().position(|d| !d.is_finite() || (d.length() - 1.0).abs() > 1e-3 || d.z < 0.0) {
+            if let Some(i) =
+                set.iter().position(|d| !d.is_finite() || (d.length() - 1.0).abs() > 1e-3 || d.z < 0.0)
+            {
                 return Err(format!("{name} direction {i} is not a unit vector of the upper hemisphere"));
             }
         }
         if self.size.iter().any(|&n| n == 0 || n > side) {
-            return Err(format!("{} x {} texels; 1 to {side} along an axis are possible", self.size[0], self.size[1]));
+            return Err(format!(
+                "{} x {} texels; 1 to {side} along an axis are possible",
+                self.size[0], self.size[1]
+            ));
         }
         let length = self.texels() as u64 * self.texel_len() as u64 * self.sample.len_bytes() as u64;
         if length > bytes {
@@ -179,12 +184,22 @@ impl Writer {
     pub fn create(path: &Path, description: Description) -> Result<Writer> {
         description.check().map_err(|what| ToolError::Usage(format!("{}: {what}", path.display())))?;
         let folder = folder_of(path);
-        let file = tempfile::Builder::new().prefix(".selvedge-").tempfile_in(folder).map_err(|error| ToolError::io(path)(error.kind().into()))?;
-        let length = HEAD_LENGTH + description.texels() as u64 * description.texel_len() as u64 * description.sample.len_bytes() as u64;
-        // A few megabytes of factors may unfold to terabytes, and the file has no bytes on the disk before they are written.
+        let file = tempfile::Builder::new()
+            .prefix(".selvedge-")
+            .tempfile_in(folder)
+            .map_err(|error| ToolError::io(path)(error.kind().into()))?;
+        let length = HEAD_LENGTH
+            + description.texels() as u64
+                * description.texel_len() as u64
+                * description.sample.len_bytes() as u64;
+        // A few megabytes of factors may unfold to terabytes, and the file has no bytes on the disk before
+        // they are written.
         let free = fs4::available_space(folder).map_err(ToolError::io(folder))?;
         if length > free {
-            return Err(ToolError::Usage(format!("{}: the dataset takes {length} bytes, and {free} are free", path.display())));
+            return Err(ToolError::Usage(format!(
+                "{}: the dataset takes {length} bytes, and {free} are free",
+                path.display()
+            )));
         }
         file.as_file().set_len(length).map_err(ToolError::io(path))?;
         Ok(Writer { file, path: path.to_owned(), description })
@@ -198,12 +213,16 @@ impl Writer {
     /// Writes numbers of one texel from pair `first_pair` on, `[view][light][colour]`; any thread may.
     ///
     /// # Errors
-    /// If a number is negative or not finite (or, with the place, beyond binary16 where that is stored), or on I/O.
+    /// If a number is negative or not finite (or, with the place, beyond binary16 where that is stored), or
+    /// on I/O.
     pub fn put(&self, texel: usize, first_pair: usize, values: &[f32]) -> Result<()> {
         let largest = self.description.sample.largest();
         if let Some(i) = first_beyond(values, largest) {
             let ([x, y], [light, view]) = (self.texel_place(texel), self.pair_place(first_pair + i / 3));
-            let what = format!("texel ({x}, {y}), light {light}, view {view}: {} is not a radiance from 0 to {largest:e}", values[i]);
+            let what = format!(
+                "texel ({x}, {y}), light {light}, view {view}: {} is not a radiance from 0 to {largest:e}",
+                values[i]
+            );
             return Err(ToolError::Usage(format!("{}: {what}", self.path.display())));
         }
         let mut bytes = vec![0; values.len() * self.description.sample.len_bytes()];
@@ -213,9 +232,12 @@ impl Writer {
                 half.convert_from_f32_slice(values);
                 bytes.as_chunks_mut().0.iter_mut().zip(&half).for_each(|(bytes, v)| *bytes = v.to_le_bytes());
             }
-            Sample::Float => bytes.as_chunks_mut().0.iter_mut().zip(values).for_each(|(bytes, v)| *bytes = v.to_le_bytes()),
+            Sample::Float => {
+                bytes.as_chunks_mut().0.iter_mut().zip(values).for_each(|(bytes, v)| *bytes = v.to_le_bytes())
+            }
         }
-        let at = (texel * self.description.texel_len() + first_pair * 3) as u64 * self.description.sample.len_bytes() as u64;
+        let at = (texel * self.description.texel_len() + first_pair * 3) as u64
+            * self.description.sample.len_bytes() as u64;
         write_all_at(self.file.as_file(), &bytes, HEAD_LENGTH + at).map_err(ToolError::io(&self.path))
     }
 
@@ -248,9 +270,13 @@ impl Writer {
             statistics: Statistics::default(),
         };
         let statistics = read.measure()?;
-        let head = serde_json::to_vec(&Head { description: self.description, statistics }).expect("plain data");
+        let head =
+            serde_json::to_vec(&Head { description: self.description, statistics }).expect("plain data");
         if head.len() as u64 > HEAD_LENGTH - 16 {
-            return Err(ToolError::Usage(format!("{}: the texts of the description are too long", self.path.display())));
+            return Err(ToolError::Usage(format!(
+                "{}: the texts of the description are too long",
+                self.path.display()
+            )));
         }
         let mut start = MAGIC.to_vec();
         start.extend((head.len() as u64).to_le_bytes());
@@ -288,20 +314,29 @@ impl Dataset {
         let head_length = u64::from_le_bytes(std::array::from_fn(|i| start[8 + i]));
         let head = start.get(16..).and_then(|rest| rest.get(..usize::try_from(head_length).ok()?));
         let Some(head) = head else { return Err(invalid(path, 8, format!("a head of {head_length} bytes"))) };
-        let Head { description, statistics } = serde_json::from_slice(head).map_err(|error| invalid(path, 16, error.to_string()))?;
+        let Head { description, statistics } =
+            serde_json::from_slice(head).map_err(|error| invalid(path, 16, error.to_string()))?;
         description.check().map_err(|what| invalid(path, 16, what))?;
-        let wanted = HEAD_LENGTH + description.texels() as u64 * description.texel_len() as u64 * description.sample.len_bytes() as u64;
+        let wanted = HEAD_LENGTH
+            + description.texels() as u64
+                * description.texel_len() as u64
+                * description.sample.len_bytes() as u64;
         if length != wanted {
             return Err(invalid(path, length.min(wanted), format!("{length} bytes where {wanted} are due")));
         }
         Ok(Dataset { file, path: path.to_owned(), description, statistics })
     }
 
-    /// Makes a dataset of a function of the texel and of the number in it, `[view][light][colour]`, called in that order.
+    /// Makes a dataset of a function of the texel and of the number in it, `[view][light][colour]`, called in
+    /// that order.
     ///
     /// # Errors
     /// As those of [`Writer`].
-    pub fn from_fn(path: &Path, description: Description, mut value: impl FnMut(usize, usize) -> f32) -> Result<Dataset> {
+    pub fn from_fn(
+        path: &Path,
+        description: Description,
+        mut value: impl FnMut(usize, usize) -> f32,
+    ) -> Result<Dataset> {
         let (texels, length) = (description.texels(), description.texel_len());
         let writer = Writer::create(path, description)?;
         for texel in 0..texels {
@@ -336,15 +371,31 @@ impl Dataset {
     ///
     /// # Errors
     /// On I/O, and if a number is negative or not finite.
-    pub fn read(&self, first_texel: usize, texels: usize, bytes: &mut Vec<u8>, values: &mut [f32]) -> Result<()> {
-        self.read_numbers(first_texel * self.description.texel_len(), bytes, &mut values[..texels * self.description.texel_len()])
+    pub fn read(
+        &self,
+        first_texel: usize,
+        texels: usize,
+        bytes: &mut Vec<u8>,
+        values: &mut [f32],
+    ) -> Result<()> {
+        self.read_numbers(
+            first_texel * self.description.texel_len(),
+            bytes,
+            &mut values[..texels * self.description.texel_len()],
+        )
     }
 
     /// Reads numbers of one texel from pair `first_pair` on.
     ///
     /// # Errors
     /// As [`Dataset::read`].
-    pub fn read_pairs(&self, texel: usize, first_pair: usize, bytes: &mut Vec<u8>, values: &mut [f32]) -> Result<()> {
+    pub fn read_pairs(
+        &self,
+        texel: usize,
+        first_pair: usize,
+        bytes: &mut Vec<u8>,
+        values: &mut [f32],
+    ) -> Result<()> {
         self.read_numbers(texel * self.description.texel_len() + first_pair * 3, bytes, values)
     }
 
@@ -355,7 +406,9 @@ impl Dataset {
     pub fn read_images(&self, first_pair: usize, pairs: usize) -> Result<Vec<f32>> {
         let mut values = vec![0.0; self.description.texels() * pairs * 3];
         let runs = values.par_chunks_mut(pairs * 3).enumerate();
-        runs.try_for_each_init(Vec::new, |bytes, (texel, run)| self.read_pairs(texel, first_pair, bytes, run))?;
+        runs.try_for_each_init(Vec::new, |bytes, (texel, run)| {
+            self.read_pairs(texel, first_pair, bytes, run)
+        })?;
         Ok(values)
     }
 
@@ -367,13 +420,18 @@ impl Dataset {
         match self.description.sample {
             Sample::Half => {
                 // Through aligned halves, which the library converts by vector instructions where it can.
-                let halves: Vec<half::f16> = bytes.as_chunks::<2>().0.iter().map(|&b| half::f16::from_le_bytes(b)).collect();
+                let halves: Vec<half::f16> =
+                    bytes.as_chunks::<2>().0.iter().map(|&b| half::f16::from_le_bytes(b)).collect();
                 halves.convert_to_f32_slice(values);
             }
-            Sample::Float => values.iter_mut().zip(bytes.as_chunks::<4>().0).for_each(|(v, &b)| *v = f32::from_le_bytes(b)),
+            Sample::Float => {
+                values.iter_mut().zip(bytes.as_chunks::<4>().0).for_each(|(v, &b)| *v = f32::from_le_bytes(b))
+            }
         }
         match first_beyond(values, f32::MAX) {
-            Some(i) => Err(invalid(&self.path, at + (i * size) as u64, format!("{} is not a radiance", values[i]))),
+            Some(i) => {
+                Err(invalid(&self.path, at + (i * size) as u64, format!("{} is not a radiance", values[i])))
+            }
             None => Ok(()),
         }
     }
@@ -452,7 +510,10 @@ mod tests {
             let mut values = vec![0.0; 2 * length];
             dataset.read(6, 2, &mut Vec::new(), &mut values).expect("read");
             assert!(values.iter().enumerate().all(|(i, &v)| v == (6 * length + i) as f32 / 4.0));
-            assert_eq!(dataset.image(3, 1).expect("read")[2], std::array::from_fn(|c| (2 * length + (7 + 3) * 3 + c) as f32 / 4.0));
+            assert_eq!(
+                dataset.image(3, 1).expect("read")[2],
+                std::array::from_fn(|c| (2 * length + (7 + 3) * 3 + c) as f32 / 4.0)
+            );
         }
     }
 

@@ -1,6 +1,6 @@
-//! The whole story: modelled materials are rendered, trained on and encoded ([`crate::story`]), measured ones imported
-//! from the excerpt in the repository; all files are validated, decoded on CPU and GPU and compared word for word,
-//! measured against their data, and shown.
+//! The whole story: modelled materials are rendered, trained on and encoded ([`crate::story`]), measured ones
+//! imported from the excerpt in the repository; all files are validated, decoded on CPU and GPU and compared
+//! word for word, measured against their data, and shown.
 
 use crate::error::{Result, ToolError};
 use crate::picture::{Picture, false_colour};
@@ -48,7 +48,12 @@ pub struct ChannelError {
 }
 
 /// Measures a channel over images at `pairs` of sample directions.
-pub fn channel_error(authors: &AuthorsMaterial, material: &Selvedge<'_>, channel: usize, pairs: &[[usize; 2]]) -> ChannelError {
+pub fn channel_error(
+    authors: &AuthorsMaterial,
+    material: &Selvedge<'_>,
+    channel: usize,
+    pairs: &[[usize; 2]],
+) -> ChannelError {
     let [width, height] = material.image_size(0);
     let (mut signal, mut error, mut texture_error, mut largest) = (0.0, 0.0, 0.0, 0.0f64);
     for &[light, view] in pairs {
@@ -71,24 +76,47 @@ pub fn channel_error(authors: &AuthorsMaterial, material: &Selvedge<'_>, channel
         error += e2 / count;
         texture_error += e2 / count - (e / count).powi(2);
     }
-    ChannelError { texture_snr_db: 10.0 * (signal / texture_error).log10(), total_snr_db: 10.0 * (signal / error).log10(), largest }
+    ChannelError {
+        texture_snr_db: 10.0 * (signal / texture_error).log10(),
+        total_snr_db: 10.0 * (signal / error).log10(),
+        largest,
+    }
 }
 
 /// A channel's decoded values, the authors', and their difference in false colour, side by side.
-fn channel_tiles(authors: &AuthorsMaterial, material: &Selvedge<'_>, channel: usize, light: usize, view: usize) -> Picture {
+fn channel_tiles(
+    authors: &AuthorsMaterial,
+    material: &Selvedge<'_>,
+    channel: usize,
+    light: usize,
+    view: usize,
+) -> Picture {
     let [width, height] = material.image_size(0).map(|s| s as usize);
     let pair = view * authors.rows[2] + light;
-    let reference: Vec<f64> = authors.normalised_image(channel, light, view).iter().map(|n| n * authors.deviation[pair] + authors.mean[pair]).collect();
+    let reference: Vec<f64> = authors
+        .normalised_image(channel, light, view)
+        .iter()
+        .map(|n| n * authors.deviation[pair] + authors.mean[pair])
+        .collect();
     let decoded: Vec<f64> = (0..width * height)
         .map(|i| {
-            let values = material.point_values((i % width) as u32, (i / width) as u32, light as u32, view as u32);
+            let values =
+                material.point_values((i % width) as u32, (i / width) as u32, light as u32, view as u32);
             [values.c0, values.c1, values.c2][channel] as f64 / 1_048_576.0 * LN_2
         })
         .collect();
-    let (low, high) = reference.iter().fold((f64::MAX, f64::MIN), |(low, high), &v| (low.min(v), high.max(v)));
-    let grey = |values: &[f64]| Picture::from_fn(width, height, |x, y| [(((values[y * width + x] - low) / (high - low)).clamp(0.0, 1.0).powf(2.2)) as f32; 3]);
-    let error =
-        Picture::from_fn(width, height, |x, y| false_colour(((decoded[y * width + x] - reference[y * width + x]).abs() / ((high - low) * 0.02)) as f32));
+    let (low, high) =
+        reference.iter().fold((f64::MAX, f64::MIN), |(low, high), &v| (low.min(v), high.max(v)));
+    let grey = |values: &[f64]| {
+        Picture::from_fn(width, height, |x, y| {
+            [(((values[y * width + x] - low) / (high - low)).clamp(0.0, 1.0).powf(2.2)) as f32; 3]
+        })
+    };
+    let error = Picture::from_fn(width, height, |x, y| {
+        false_colour(
+            ((decoded[y * width + x] - reference[y * width + x]).abs() / ((high - low) * 0.02)) as f32,
+        )
+    });
     Picture::beside(&[grey(&decoded).enlarged(4), grey(&reference).enlarged(4), error.enlarged(4)], 8)
 }
 
@@ -97,7 +125,10 @@ fn compare_with_gpu(materials: &[Selvedge<'_>], say: &mut dyn FnMut(String)) -> 
     use crate::gpu::{Answer, Gpu, Query, answer_on_cpu, direction_words, random_query};
     use crate::random::Random;
     let Some(gpu) = Gpu::any()? else {
-        say("NO GPU ADAPTER FOUND, NOT EVEN A SOFTWARE ONE: THE KERNEL WAS NOT RUN AND NOTHING WAS COMPARED.".into());
+        say(
+            "NO GPU ADAPTER FOUND, NOT EVEN A SOFTWARE ONE: THE KERNEL WAS NOT RUN AND NOTHING WAS COMPARED."
+                .into(),
+        );
         return Ok("NO ADAPTER FOUND: THE KERNEL WAS NOT RUN".into());
     };
     let loaded = gpu.load(materials);
@@ -105,23 +136,44 @@ fn compare_with_gpu(materials: &[Selvedge<'_>], say: &mut dyn FnMut(String)) -> 
     let (mut words, mut differing) = (0usize, 0usize);
     let mut compare = |gpu: &[Answer], cpu: &[Answer]| {
         words += cpu.len() * 6;
-        let differs = |(a, b): (&Answer, &Answer)| (0..3).filter(|&i| a.rgb[i] != b.rgb[i]).count() + (0..3).filter(|&i| a.values[i] != b.values[i]).count();
+        let differs = |(a, b): (&Answer, &Answer)| {
+            (0..3).filter(|&i| a.rgb[i] != b.rgb[i]).count()
+                + (0..3).filter(|&i| a.values[i] != b.values[i]).count()
+        };
         differing += gpu.iter().zip(cpu).map(differs).sum::<usize>() + gpu.len().abs_diff(cpu.len()) * 6;
     };
     for entry in ["texel", "filtered", "trilinear", "floats"] {
-        let queries: Vec<Query> = (0..50_000).map(|i| random_query(&mut random, entry, (i % materials.len()) as u32)).collect();
-        let cpu: Vec<Answer> = queries.iter().map(|query| answer_on_cpu(&materials[query.material as usize], entry, query)).collect();
+        let queries: Vec<Query> =
+            (0..50_000).map(|i| random_query(&mut random, entry, (i % materials.len()) as u32)).collect();
+        let cpu: Vec<Answer> = queries
+            .iter()
+            .map(|query| answer_on_cpu(&materials[query.material as usize], entry, query))
+            .collect();
         compare(&gpu.answer(&loaded, entry, &queries)?, &cpu);
     }
     for (number, material) in materials.iter().enumerate() {
-        let [light, view] = [Direction::from_unit_vector([0.5, 0.1, 0.86]), Direction::from_unit_vector([-0.3, 0.2, 0.93])];
-        let query = Query { material: number as u32, light: direction_words(light), view: direction_words(view), ..Query::default() };
+        let [light, view] =
+            [Direction::from_unit_vector([0.5, 0.1, 0.86]), Direction::from_unit_vector([-0.3, 0.2, 0.93])];
+        let query = Query {
+            material: number as u32,
+            light: direction_words(light),
+            view: direction_words(view),
+            ..Query::default()
+        };
         let size = material.image_size(0);
         let on_gpu = gpu.image(&loaded, query, size)?;
         let picture = decode_picture(material, 0, light, view)?;
         let taps = (material.locate_light(light), material.locate_view(view));
-        let values =
-            |i: usize| selvedge::interpolation::texel_values(material.words(), material.material(), i as u32 % size[0], i as u32 / size[0], taps.0, taps.1);
+        let values = |i: usize| {
+            selvedge::interpolation::texel_values(
+                material.words(),
+                material.material(),
+                i as u32 % size[0],
+                i as u32 / size[0],
+                taps.0,
+                taps.1,
+            )
+        };
         let answer = |(i, rgb): (usize, &[f32; 3])| {
             let [r, g, b] = rgb.map(f32::to_bits);
             Answer::new(selvedge::Rgb { r, g, b }, values(i))
@@ -174,9 +226,16 @@ pub fn run(out: &Path, say: &mut dyn FnMut(String)) -> Result<()> {
     written.extend(story.written);
     let mut materials = Vec::new();
     for (path, bytes) in &written {
-        let report = validate::validate(&path.display().to_string(), bytes, None, &validate::Options::default());
-        let opened = selvedge::open(bytes, &Limits::default()).map_err(|finding| ToolError::Invalid { path: path.clone(), finding })?;
-        say(format!("{}: {} findings, decode digest {}", path.display(), report.count(), &inspect::hex(&opened.decode_digest())[..16]));
+        let report =
+            validate::validate(&path.display().to_string(), bytes, None, &validate::Options::default());
+        let opened = selvedge::open(bytes, &Limits::default())
+            .map_err(|finding| ToolError::Invalid { path: path.clone(), finding })?;
+        say(format!(
+            "{}: {} findings, decode digest {}",
+            path.display(),
+            report.count(),
+            &inspect::hex(&opened.decode_digest())[..16]
+        ));
         materials.push(opened);
     }
     let gpu_line = compare_with_gpu(&materials, say)?;
@@ -197,7 +256,10 @@ pub fn run(out: &Path, say: &mut dyn FnMut(String)) -> Result<()> {
                 authors.name, error.texture_snr_db, error.total_snr_db, error.largest
             );
             if error.texture_snr_db < 40.0 {
-                return Err(ToolError::Mismatch(format!("{} {letter}: only {:.1} dB", authors.name, error.texture_snr_db)));
+                return Err(ToolError::Mismatch(format!(
+                    "{} {letter}: only {:.1} dB",
+                    authors.name, error.texture_snr_db
+                )));
             }
         }
         let light = glam::DVec3::new(-0.45, 0.5, 0.74).normalize();
@@ -211,13 +273,19 @@ pub fn run(out: &Path, say: &mut dyn FnMut(String)) -> Result<()> {
         channel_tiles(authors, material, 2, 20, 0).save(&out.join(format!("{}-V.png", authors.name)))?;
     }
     Picture::beside(&balls, 12).save(&out.join("balls.png"))?;
-    files::write(&out.join("index.html"), page(&materials, imported, &story.html, &rows, &gpu_line).as_bytes())?;
+    files::write(
+        &out.join("index.html"),
+        page(&materials, imported, &story.html, &rows, &gpu_line).as_bytes(),
+    )?;
     say(format!("page: {}", out.join("index.html").display()));
     Ok(())
 }
 
 fn page(materials: &[Selvedge<'_>], imported: usize, story: &str, rows: &str, gpu_line: &str) -> String {
-    let facts: String = materials.iter().map(|material| format!("<pre>{}</pre>", inspect::info_text(&inspect::info(material)))).collect();
+    let facts: String = materials
+        .iter()
+        .map(|material| format!("<pre>{}</pre>", inspect::info_text(&inspect::info(material))))
+        .collect();
     let tiles: String = materials[..imported]
         .iter()
         .map(|material| {

@@ -1,8 +1,8 @@
 //! Ensembles of orthonormal 4-D dictionaries in floats (SparseBTF 2023, equation 1): what training makes and
 //! encoding projects on.
 //!
-//! The dictionaries of a channel share one basis of lights and one of views; each turns the first columns of both
-//! in its own way and keeps the others. So the costly product with all directions is made once a block
+//! The dictionaries of a channel share one basis of lights and one of views; each turns the first columns of
+//! both in its own way and keeps the others. So the costly product with all directions is made once a block
 //! (equation 3 in a subspace), and a dictionary adds small products only.
 
 use crate::linear::{Basis, multiply, product, product_at};
@@ -48,12 +48,17 @@ impl Ensemble {
         self.turns[0].x.rows
     }
 
-    /// The same angular bases with cosines over blocks of another edge; the ensemble itself if it has that edge.
+    /// The same angular bases with cosines over blocks of another edge; the ensemble itself if it has that
+    /// edge.
     pub fn with_edge(&self, edge: usize) -> Ensemble {
         if edge == self.edge() {
             return self.clone();
         }
-        let turns = self.turns.iter().map(|turn| Turn { x: Basis::cosine(edge), y: Basis::cosine(edge), ..turn.clone() }).collect();
+        let turns = self
+            .turns
+            .iter()
+            .map(|turn| Turn { x: Basis::cosine(edge), y: Basis::cosine(edge), ..turn.clone() })
+            .collect();
         Ensemble { turns, ..self.clone() }
     }
 
@@ -64,7 +69,9 @@ impl Ensemble {
 
     /// Bases of lights and views of one dictionary.
     pub fn angular(&self, dictionary: usize) -> [Basis; 2] {
-        let turned = |basis: &Basis, turn: &Option<Basis>| turn.as_ref().map_or_else(|| basis.clone(), |turn| basis.turned(turn));
+        let turned = |basis: &Basis, turn: &Option<Basis>| {
+            turn.as_ref().map_or_else(|| basis.clone(), |turn| basis.turned(turn))
+        };
         let turn = &self.turns[dictionary];
         [turned(&self.light, &turn.light), turned(&self.view, &turn.view)]
     }
@@ -83,7 +90,13 @@ impl Ensemble {
     }
 
     /// Coefficients of a core in one dictionary: `[y][x][view column][light column]`.
-    pub fn to_coefficients(&self, dictionary: usize, core: &[f32], scratch: &mut Scratch, out: &mut Vec<f32>) {
+    pub fn to_coefficients(
+        &self,
+        dictionary: usize,
+        core: &[f32],
+        scratch: &mut Scratch,
+        out: &mut Vec<f32>,
+    ) {
         let (cl, cv, edge) = (self.light.columns, self.view.columns, self.edge());
         let turn = &self.turns[dictionary];
         let per_texel = cl * cv;
@@ -133,12 +146,18 @@ mod tests {
     #[test]
     fn coefficients_are_equation_3() {
         let mut random = Random::new(1);
-        let mut any = |n: usize| -> Vec<f64> { (0..n).map(|_| random.range(-1000, 1000) as f64 / 1000.0).collect() };
+        let mut any =
+            |n: usize| -> Vec<f64> { (0..n).map(|_| random.range(-1000, 1000) as f64 / 1000.0).collect() };
         let (lights, views, edge, r) = (7, 5, 3, 4);
         let mut basis = |n: usize| nearest_orthogonal(&any(n * n), n).expect("finite");
         let turn = Turn { light: Some(basis(r)), view: Some(basis(r)), x: basis(edge), y: basis(edge) };
         let plain = Turn { light: None, view: None, x: basis(edge), y: basis(edge) };
-        let ensemble = Ensemble { light: basis(lights).first(6), view: basis(views), turns: vec![turn, plain], tables: None };
+        let ensemble = Ensemble {
+            light: basis(lights).first(6),
+            view: basis(views),
+            turns: vec![turn, plain],
+            tables: None,
+        };
         let block: Vec<f32> = any(edge * edge * lights * views).iter().map(|&v| v as f32).collect();
         let (mut scratch, mut core, mut out) = (Scratch::default(), Vec::new(), Vec::new());
         ensemble.to_core(&block, &mut scratch, &mut core);
@@ -148,8 +167,17 @@ mod tests {
             for (i, &got) in out.iter().enumerate() {
                 let (l, v, x, y) = (i % 6, i / 6 % views, i / 6 / views % edge, i / 6 / views / edge);
                 let term = |n: usize| {
-                    let (a, b, p, q) = (n % lights, n / lights % views, n / lights / views % edge, n / lights / views / edge);
-                    block[n] * light.at(a, l) * view.at(b, v) * ensemble.turns[k].x.at(p, x) * ensemble.turns[k].y.at(q, y)
+                    let (a, b, p, q) = (
+                        n % lights,
+                        n / lights % views,
+                        n / lights / views % edge,
+                        n / lights / views / edge,
+                    );
+                    block[n]
+                        * light.at(a, l)
+                        * view.at(b, v)
+                        * ensemble.turns[k].x.at(p, x)
+                        * ensemble.turns[k].y.at(q, y)
                 };
                 let wanted = (0..block.len()).map(term).sum::<f32>();
                 assert!((got - wanted).abs() < 1e-4, "{k} {i}: {got} {wanted}");

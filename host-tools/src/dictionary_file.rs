@@ -1,13 +1,16 @@
-//! Trained ensembles as files: a Selvedge file of content 1 with all columns of every dictionary, in integers.
+//! Trained ensembles as files: a Selvedge file of content 1 with all columns of every dictionary, in
+//! integers.
 //!
-//! What the factors themselves do not say, the directions and how training went, stands beside them in a section
-//! of an optional kind as JSON, which decoders skip.
+//! What the factors themselves do not say, the directions and how training went, stands beside them in a
+//! section of an optional kind as JSON, which decoders skip.
 
 use crate::dictionary::{Ensemble, Turn};
 use crate::encode::assemble::Used;
 use crate::error::{Result, ToolError};
 use crate::linear::{Basis, nearest_orthogonal, product_at};
-use crate::model::{ChannelModel, DictionaryModel, EnsembleModel, FactorModel, MaterialModel, MetadataModel, TransferModel};
+use crate::model::{
+    ChannelModel, DictionaryModel, EnsembleModel, FactorModel, MaterialModel, MetadataModel, TransferModel,
+};
 use crate::train::{Options, Trained};
 use crate::triangulate::project;
 use crate::write::{take_apart, write_dictionary};
@@ -55,7 +58,9 @@ fn to_factor(basis: &Basis) -> FactorModel {
 fn to_basis(factor: &FactorModel) -> Basis {
     let columns = factor.columns as usize;
     let rows = factor.entries.len() / columns.max(1);
-    let norm = |c: usize| (0..rows).map(|r| (factor.entries[r * columns + c] as f64).powi(2)).sum::<f64>().sqrt().max(1e-9);
+    let norm = |c: usize| {
+        (0..rows).map(|r| (factor.entries[r * columns + c] as f64).powi(2)).sum::<f64>().sqrt().max(1e-9)
+    };
     let norms: Vec<f64> = (0..columns).map(norm).collect();
     Basis::from_fn(rows, columns, |r, c| (factor.entries[r * columns + c] as f64 / norms[c]) as f32)
 }
@@ -66,10 +71,19 @@ pub fn to_bytes(trained: &Trained, training: &Training, metadata: MetadataModel)
         let dictionary = |k: usize| {
             let [light, view] = ensemble.angular(k);
             let turn = &ensemble.turns[k];
-            DictionaryModel { light: to_factor(&light), view: to_factor(&view), x: to_factor(&turn.x), y: to_factor(&turn.y) }
+            DictionaryModel {
+                light: to_factor(&light),
+                view: to_factor(&view),
+                x: to_factor(&turn.x),
+                y: to_factor(&turn.y),
+            }
         };
         let dictionaries: Vec<DictionaryModel> = (0..ensemble.turns.len()).map(dictionary).collect();
-        ChannelModel { mean: None, scale: None, ensemble: Some(EnsembleModel { dictionaries, ..EnsembleModel::default() }) }
+        ChannelModel {
+            mean: None,
+            scale: None,
+            ensemble: Some(EnsembleModel { dictionaries, ..EnsembleModel::default() }),
+        }
     };
     let mut json = serde_json::to_vec(training).expect("plain data");
     json.resize(json.len().next_multiple_of(4), b' ');
@@ -107,7 +121,10 @@ pub fn from_bytes(path: &Path, bytes: Vec<u8>) -> Result<DictionaryFile> {
     }
     let fail = |what: &str| ToolError::Foreign { path: path.to_owned(), offset: 0, what: what.into() };
     let (_, parts) = take_apart(&bytes);
-    let json = parts.iter().find(|p| p.kind == TRAINING as u32).ok_or_else(|| fail("this is not a dictionary made by training"))?;
+    let json = parts
+        .iter()
+        .find(|p| p.kind == TRAINING as u32)
+        .ok_or_else(|| fail("this is not a dictionary made by training"))?;
     let training: Training = serde_json::from_slice(&json.bytes).map_err(|error| fail(&error.to_string()))?;
     let rows = [training.lights.len(), training.views.len()];
     let edge = training.options.edge;
@@ -118,9 +135,16 @@ pub fn from_bytes(path: &Path, bytes: Vec<u8>) -> Result<DictionaryFile> {
             read_factors(&part.bytes, rows)
         };
         let (Some(angular), Some(spatial)) = (factors(ANGULAR, rows), factors(SPATIAL, [edge, edge])) else {
-            return Err(fail(&format!("channel {c} has no factors of {} x {} directions and {edge} x {edge} texels", rows[0], rows[1])));
+            return Err(fail(&format!(
+                "channel {c} has no factors of {} x {} directions and {edge} x {edge} texels",
+                rows[0], rows[1]
+            )));
         };
-        let tables: Vec<DictionaryModel> = angular.into_iter().zip(spatial).map(|([light, view], [x, y])| DictionaryModel { light, view, x, y }).collect();
+        let tables: Vec<DictionaryModel> = angular
+            .into_iter()
+            .zip(spatial)
+            .map(|([light, view], [x, y])| DictionaryModel { light, view, x, y })
+            .collect();
         *ensemble = to_ensemble(tables).ok_or_else(|| fail("the dictionaries have no bases in common"))?;
     }
     Ok(DictionaryFile { bytes, ensembles, training })
@@ -134,7 +158,14 @@ fn read_factors(bytes: &[u8], rows: [usize; 2]) -> Option<Vec<[FactorModel; 2]>>
         let mut entries = Vec::new();
         for row in 0..rows {
             let at = start as usize * 4 + row * row_bytes;
-            entries.extend(bytes.get(at..at + columns as usize * 2)?.as_chunks::<2>().0.iter().map(|&b| i16::from_le_bytes(b)));
+            entries.extend(
+                bytes
+                    .get(at..at + columns as usize * 2)?
+                    .as_chunks::<2>()
+                    .0
+                    .iter()
+                    .map(|&b| i16::from_le_bytes(b)),
+            );
         }
         Some(FactorModel { columns, entries })
     };
@@ -150,7 +181,8 @@ fn read_factors(bytes: &[u8], rows: [usize; 2]) -> Option<Vec<[FactorModel; 2]>>
 fn turned_columns(factors: &[&FactorModel]) -> usize {
     let columns = factors[0].columns as usize;
     let differs = |c: &usize| {
-        let column = |f: &FactorModel| f.entries.iter().skip(*c).step_by(columns).copied().collect::<Vec<i16>>();
+        let column =
+            |f: &FactorModel| f.entries.iter().skip(*c).step_by(columns).copied().collect::<Vec<i16>>();
         factors.iter().any(|f| column(f) != column(factors[0]))
     };
     (0..columns).rev().find(differs).map_or(0, |c| c + 1)
@@ -163,20 +195,32 @@ fn to_ensemble(tables: Vec<DictionaryModel>) -> Option<Ensemble> {
         return None;
     }
     let (light, view) = (to_basis(&first.light), to_basis(&first.view));
-    let turn_of = |shared: &Basis, pick: &dyn Fn(&DictionaryModel) -> &FactorModel| -> Option<Vec<Option<Basis>>> {
-        let r = turned_columns(&tables.iter().map(pick).collect::<Vec<_>>());
-        let base = shared.first(r);
-        let turn = |(k, table): (usize, &DictionaryModel)| {
-            if k == 0 || r == 0 {
-                return Some(None);
-            }
-            let mut product = vec![0.0; r * r];
-            product_at(&mut product, &base.entries, &to_basis(pick(table)).first(r).entries, [r, base.rows, r], false);
-            nearest_orthogonal(&product.iter().map(|&p| p as f64).collect::<Vec<_>>(), r).map(Some)
+    let turn_of =
+        |shared: &Basis, pick: &dyn Fn(&DictionaryModel) -> &FactorModel| -> Option<Vec<Option<Basis>>> {
+            let r = turned_columns(&tables.iter().map(pick).collect::<Vec<_>>());
+            let base = shared.first(r);
+            let turn = |(k, table): (usize, &DictionaryModel)| {
+                if k == 0 || r == 0 {
+                    return Some(None);
+                }
+                let mut product = vec![0.0; r * r];
+                product_at(
+                    &mut product,
+                    &base.entries,
+                    &to_basis(pick(table)).first(r).entries,
+                    [r, base.rows, r],
+                    false,
+                );
+                nearest_orthogonal(&product.iter().map(|&p| p as f64).collect::<Vec<_>>(), r).map(Some)
+            };
+            tables.iter().enumerate().map(turn).collect()
         };
-        tables.iter().enumerate().map(turn).collect()
-    };
     let (lights, views) = (turn_of(&light, &|t| &t.light)?, turn_of(&view, &|t| &t.view)?);
-    let turns = tables.iter().zip(lights.into_iter().zip(views)).map(|(t, (light, view))| Turn { light, view, x: to_basis(&t.x), y: to_basis(&t.y) });
+    let turns = tables.iter().zip(lights.into_iter().zip(views)).map(|(t, (light, view))| Turn {
+        light,
+        view,
+        x: to_basis(&t.x),
+        y: to_basis(&t.y),
+    });
     Some(Ensemble { turns: turns.collect(), light, view, tables: Some(tables) })
 }

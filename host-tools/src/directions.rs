@@ -6,7 +6,14 @@ use glam::DVec3;
 type Ring = (f64, f64, f64);
 
 /// The 81 directions of UBO2003 and UTIA (Sattler et al. 2003, table 1).
-const RINGS_81: &[Ring] = &[(0.0, 0.0, 360.0), (15.0, 0.0, 60.0), (30.0, 0.0, 30.0), (45.0, 0.0, 20.0), (60.0, 0.0, 18.0), (75.0, 0.0, 15.0)];
+const RINGS_81: &[Ring] = &[
+    (0.0, 0.0, 360.0),
+    (15.0, 0.0, 60.0),
+    (30.0, 0.0, 30.0),
+    (45.0, 0.0, 20.0),
+    (60.0, 0.0, 18.0),
+    (75.0, 0.0, 15.0),
+];
 
 /// The 151 directions of UBO2014 (Bonn dome).
 const RINGS_151: &[Ring] = &[
@@ -31,7 +38,8 @@ pub fn from_degrees(polar: f64, azimuth: f64) -> DVec3 {
 /// The angle to the normal and the azimuth from 0 to 360, in degrees; azimuth 0 at the normal.
 pub fn to_degrees(direction: DVec3) -> [f64; 2] {
     let polar = direction.x.hypot(direction.y).atan2(direction.z).to_degrees();
-    let azimuth = if polar < 1e-9 { 0.0 } else { direction.y.atan2(direction.x).to_degrees().rem_euclid(360.0) };
+    let azimuth =
+        if polar < 1e-9 { 0.0 } else { direction.y.atan2(direction.x).to_degrees().rem_euclid(360.0) };
     [polar, azimuth]
 }
 
@@ -42,7 +50,9 @@ pub fn grid(count: usize) -> Option<Vec<DVec3>> {
         151 => RINGS_151,
         _ => return None,
     };
-    let ring = |&(polar, first, step): &Ring| (0..(360.0 / step) as usize).map(move |i| from_degrees(polar, first + step * i as f64));
+    let ring = |&(polar, first, step): &Ring| {
+        (0..(360.0 / step) as usize).map(move |i| from_degrees(polar, first + step * i as f64))
+    };
     Some(rings.iter().flat_map(ring).collect())
 }
 

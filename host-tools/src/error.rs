@@ -64,7 +64,10 @@ impl ToolError {
         match self {
             ToolError::Usage(_) => 1,
             ToolError::Io { .. } => 2,
-            ToolError::Foreign { .. } | ToolError::Picture { .. } | ToolError::Mismatch(_) | ToolError::Different(_) => 3,
+            ToolError::Foreign { .. }
+            | ToolError::Picture { .. }
+            | ToolError::Mismatch(_)
+            | ToolError::Different(_) => 3,
             ToolError::Kernel(_) => 5,
             ToolError::Invalid { finding, .. } => exit_code_of(finding.rule),
         }

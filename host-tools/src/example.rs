@@ -1,8 +1,8 @@
 //! The smallest material that has every section: the worked example of the specification.
 
 use crate::model::{
-    AtomModel, AtomShifts, ChannelModel, CoefficientsModel, DictionaryModel, EnsembleModel, FactorModel, ListsModel, MaterialModel, MetadataModel,
-    PairTableModel, RecordModel, TensorModel, TransferModel,
+    AtomModel, AtomShifts, ChannelModel, CoefficientsModel, DictionaryModel, EnsembleModel, FactorModel,
+    ListsModel, MaterialModel, MetadataModel, PairTableModel, RecordModel, TensorModel, TransferModel,
 };
 
 /// Three by two texels in blocks of two, five directions, one full channel and one mean, two levels.
@@ -14,18 +14,37 @@ pub fn example_model() -> MaterialModel {
         x: factor(2, &[32767, 32767, 32767, -32767]),
         y: factor(1, &[32767, 16384]),
     };
-    let atom = |x: u32, light: u32, shift: u32, base: i16, step: u16| AtomModel { light, view: 0, x, y: 0, shift, base, step };
-    let record = |coefficients: &[(u32, u16)]| RecordModel { dictionary: 0, shift: 8, coefficients: coefficients.to_vec() };
+    let atom = |x: u32, light: u32, shift: u32, base: i16, step: u16| AtomModel {
+        light,
+        view: 0,
+        x,
+        y: 0,
+        shift,
+        base,
+        step,
+    };
+    let record = |coefficients: &[(u32, u16)]| RecordModel {
+        dictionary: 0,
+        shift: 8,
+        coefficients: coefficients.to_vec(),
+    };
     let empty = RecordModel::default();
     let ensemble = EnsembleModel {
         dictionaries: vec![dictionary],
         atoms: vec![vec![atom(0, 0, 0, -16000, 32000), atom(0, 1, 2, -8000, 16000), atom(1, 0, 3, 0, 32767)]],
         coefficients: vec![
-            vec![CoefficientsModel { value_bits: 4, records: vec![record(&[(0, 15), (2, 7)]), record(&[(1, 3)])] }],
+            vec![CoefficientsModel {
+                value_bits: 4,
+                records: vec![record(&[(0, 15), (2, 7)]), record(&[(1, 3)])],
+            }],
             vec![CoefficientsModel { value_bits: 4, records: vec![empty] }],
         ],
     };
-    let table = |base_q20: i32, shift: u32, step: i16| PairTableModel { base_q20, shift, entries: (0..25).map(|i| i * step - 400).collect() };
+    let table = |base_q20: i32, shift: u32, step: i16| PairTableModel {
+        base_q20,
+        shift,
+        entries: (0..25).map(|i| i * step - 400).collect(),
+    };
     MaterialModel {
         size: [3, 2],
         level_count: 2,
@@ -59,7 +78,8 @@ pub fn example_model() -> MaterialModel {
 
 /// The smallest sparse tensor that has every section: the worked example of chapter 12.
 ///
-/// Three by two texels, the directions of [`example_model`], two full channels and one mean, one level and layer.
+/// Three by two texels, the directions of [`example_model`], two full channels and one mean, one level and
+/// layer.
 pub fn tensor_example_model() -> MaterialModel {
     let base = example_model();
     let mean = base.channels[1].mean.clone();
@@ -96,7 +116,14 @@ pub fn tensor_example_model() -> MaterialModel {
         lists: vec![vec![ListsModel {
             value_bits: 6,
             shift: 11,
-            lists: vec![vec![(0, 63), (1, 10)], vec![(1, 0)], vec![], vec![(0, 40)], vec![(0, 20), (1, 33)], vec![(1, 63)]],
+            lists: vec![
+                vec![(0, 63), (1, 10)],
+                vec![(1, 0)],
+                vec![],
+                vec![(0, 40)],
+                vec![(0, 20), (1, 33)],
+                vec![(1, 63)],
+            ],
         }]],
     };
     MaterialModel {
@@ -105,7 +132,10 @@ pub fn tensor_example_model() -> MaterialModel {
         channels: [channel(), channel(), channel()],
         tensor: Some(tensor),
         extras: Vec::new(),
-        metadata: MetadataModel { texts: ["tensor example".into(), "the specification".into(), "CC0-1.0".into()], ..base.metadata },
+        metadata: MetadataModel {
+            texts: ["tensor example".into(), "the specification".into(), "CC0-1.0".into()],
+            ..base.metadata
+        },
         ..base
     }
 }
@@ -114,10 +144,17 @@ pub fn tensor_example_model() -> MaterialModel {
 pub fn parts(file: &[u8]) -> Vec<(String, Vec<u8>, usize)> {
     let opened = selvedge::open(file, &selvedge::Limits::NONE).expect("a legal file");
     let directory_end = 128 + opened.header().section_count as usize * 16;
-    let mut parts = vec![("header".to_owned(), file[..128].to_vec(), 0), ("directory".to_owned(), file[128..directory_end].to_vec(), 128)];
+    let mut parts = vec![
+        ("header".to_owned(), file[..128].to_vec(), 0),
+        ("directory".to_owned(), file[128..directory_end].to_vec(), 128),
+    ];
     parts.extend(opened.sections().map(|section| {
         let range = section.offset as usize..(section.offset + section.length) as usize;
-        (format!("section {:04x}.{:04x}", section.kind, section.instance), file[range.clone()].to_vec(), range.start)
+        (
+            format!("section {:04x}.{:04x}", section.kind, section.instance),
+            file[range.clone()].to_vec(),
+            range.start,
+        )
     }));
     parts
 }
@@ -125,7 +162,10 @@ pub fn parts(file: &[u8]) -> Vec<(String, Vec<u8>, usize)> {
 /// Sixteen bytes a line, behind the offset of the first.
 pub fn hex_dump(bytes: &[u8], offset: usize) -> String {
     let line = |(i, line): (usize, &[u8])| {
-        let words: Vec<String> = line.chunks(4).map(|word| word.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ")).collect();
+        let words: Vec<String> = line
+            .chunks(4)
+            .map(|word| word.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" "))
+            .collect();
         format!("{:06x}  {}\n", offset + i * 16, words.join("  "))
     };
     bytes.chunks(16).enumerate().map(line).collect()

@@ -19,18 +19,26 @@ pub fn description(file: &Selvedge<'_>) -> Description {
     }
 }
 
-/// Decodes a file into a dataset of binary32; `progress` hears how many of how many pairs of directions are done.
+/// Decodes a file into a dataset of binary32; `progress` hears how many of how many pairs of directions are
+/// done.
 ///
 /// # Errors
 /// On I/O.
-pub fn expand(file: &Selvedge<'_>, output: &Path, memory: usize, progress: &dyn Fn(usize, usize)) -> Result<Dataset> {
+pub fn expand(
+    file: &Selvedge<'_>,
+    output: &Path,
+    memory: usize,
+    progress: &dyn Fn(usize, usize),
+) -> Result<Dataset> {
     let description = description(file);
     let writer = Writer::create(output, description.clone())?;
     let (texels, pairs, lights) = (description.texels(), description.pairs(), description.lights.len());
     let batch = (memory / (texels * 12)).clamp(1, pairs);
     for first in (0..pairs).step_by(batch) {
         let count = batch.min(pairs - first);
-        let image = |i: usize| measure::image(Source::File(file, 0), &description, (first + i) % lights, (first + i) / lights);
+        let image = |i: usize| {
+            measure::image(Source::File(file, 0), &description, (first + i) % lights, (first + i) / lights)
+        };
         let images = (0..count).into_par_iter().map(image).collect::<Result<Vec<_>>>()?;
         writer.put_images(first, &images)?;
         progress(first + count, pairs);

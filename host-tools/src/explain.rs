@@ -1,7 +1,7 @@
 //! `explain`: which block, dictionary and atoms made a texel's sample, and how much each of them gave.
 //!
-//! Results are the core's, bit for bit. What a single coefficient gives is told in floats, since the decoder rounds sums and not
-//! single terms; `rounding` is the difference.
+//! Results are the core's, bit for bit. What a single coefficient gives is told in floats, since the decoder
+//! rounds sums and not single terms; `rounding` is the difference.
 
 use crate::read::{RecordTables, list, record_coefficients};
 use selvedge::direction::{Direction, Taps};
@@ -125,7 +125,10 @@ pub struct Explanation {
 
 fn tap_list(taps: Taps) -> Vec<(u32, f64)> {
     let all = [(taps.a, taps.weight_a_q15), (taps.b, taps.weight_b_q15), (taps.c, taps.weight_c_q15)];
-    all.into_iter().filter(|(_, weight)| *weight != 0).map(|(i, weight)| (i, weight as f64 / 32768.0)).collect()
+    all.into_iter()
+        .filter(|(_, weight)| *weight != 0)
+        .map(|(i, weight)| (i, weight as f64 / 32768.0))
+        .collect()
 }
 
 /// Takes the sample of one texel of level 0 apart.
@@ -136,9 +139,15 @@ pub fn explain(opened: &Selvedge<'_>, texel: [u32; 2], light: Direction, view: D
     let [x, y] = texel.map(axis);
     let (light, view) = (opened.locate_light(light), opened.locate_view(view));
     let textured = material.method == METHOD_SPARSE_TENSOR && material.full_count > 0;
-    let given = if textured { textures_q20(words, material, 0, x, y, light, view) } else { Values::default() };
+    let given =
+        if textured { textures_q20(words, material, 0, x, y, light, view) } else { Values::default() };
     let given = [given.c0, given.c1, given.c2];
-    let channels = material.channels.iter().zip(given).map(|(channel, given)| channel_report(opened, *channel, given, x, y, light, view)).collect();
+    let channels = material
+        .channels
+        .iter()
+        .zip(given)
+        .map(|(channel, given)| channel_report(opened, *channel, given, x, y, light, view))
+        .collect();
     let layers = if textured { material.layer_limit } else { 0 };
     let lists = (0..layers).map(|layer| list_report(opened, layer, x, y, light, view)).collect();
     let values: Values = texel_values(words, material, texel[0], texel[1], light, view);
@@ -154,14 +163,29 @@ pub fn explain(opened: &Selvedge<'_>, texel: [u32; 2], light: Direction, view: D
     }
 }
 
-fn channel_report(opened: &Selvedge<'_>, channel: Channel, given: i32, x: Axis, y: Axis, light: Taps, view: Taps) -> ChannelReport {
+fn channel_report(
+    opened: &Selvedge<'_>,
+    channel: Channel,
+    given: i32,
+    x: Axis,
+    y: Axis,
+    light: Taps,
+    view: Taps,
+) -> ChannelReport {
     let (material, words) = (opened.material(), opened.words());
     let value_q20 = channel_q20(words, material, channel, given, 0, x, y, light, view);
-    let mean = if channel.state == CHANNEL_MISSING { 0.0 } else { mean_q20(words, material, channel, light, view) as f64 / ONE_Q20 };
+    let mean = if channel.state == CHANNEL_MISSING {
+        0.0
+    } else {
+        mean_q20(words, material, channel, light, view) as f64 / ONE_Q20
+    };
     let scaled = channel.state == CHANNEL_FULL && channel.scale_start != 0;
-    let gain = |scale_q15: i32| scale_q15 as f64 / 32768.0 * 2f64.powi(word(words, channel.scale_start + 1) as i32);
+    let gain =
+        |scale_q15: i32| scale_q15 as f64 / 32768.0 * 2f64.powi(word(words, channel.scale_start + 1) as i32);
     let records = if channel.state == CHANNEL_FULL && material.method != METHOD_SPARSE_TENSOR {
-        (0..material.layer_limit).filter_map(|layer| record_report(opened, channel, layer, x, y, light, view)).collect()
+        (0..material.layer_limit)
+            .filter_map(|layer| record_report(opened, channel, layer, x, y, light, view))
+            .collect()
     } else {
         Vec::new()
     };
@@ -175,14 +199,23 @@ fn channel_report(opened: &Selvedge<'_>, channel: Channel, given: i32, x: Axis, 
     }
 }
 
-fn record_report(opened: &Selvedge<'_>, channel: Channel, layer: u32, x: Axis, y: Axis, light: Taps, view: Taps) -> Option<RecordReport> {
+fn record_report(
+    opened: &Selvedge<'_>,
+    channel: Channel,
+    layer: u32,
+    x: Axis,
+    y: Axis,
+    light: Taps,
+    view: Taps,
+) -> Option<RecordReport> {
     let (material, words) = (opened.material(), opened.words());
     let block = y.first.block * block_count(material, material.width) + x.first.block;
     let record = read_record(words, coefficients_start(words, material, channel, 0, layer), block);
     if record.count == 0 {
         return None;
     }
-    let RecordTables { light: light_table, view: view_table, x: x_table, y: y_table, atoms } = RecordTables::of(words, channel, record.dictionary);
+    let RecordTables { light: light_table, view: view_table, x: x_table, y: y_table, atoms } =
+        RecordTables::of(words, channel, record.dictionary);
     let mut terms = Vec::new();
     record_coefficients(words, record, |position, value| {
         let (atom, quantiser) = (word(words, atoms + position * 2), word(words, atoms + position * 2 + 1));
@@ -194,15 +227,34 @@ fn record_report(opened: &Selvedge<'_>, channel: Channel, layer: u32, x: Axis, y
             blend_span(words, y_table.0, y_table.1, y.first, columns[3]),
         ];
         let coefficient = dequantise(quantiser, value, record.value_bits);
-        // 10.7 without its roundings: the angular product in Q15, then the atom's and the record's shift, to Q20.
+        // 10.7 without its roundings: the angular product in Q15, then the atom's and the record's shift, to
+        // Q20.
         let product: f64 = factors_q15.iter().map(|&u| u as f64 / 32768.0).product();
-        let adds = coefficient as f64 * product * 32768.0 / 2f64.powi((atom & 0xf) as i32 + record.shift as i32) / ONE_Q20;
-        terms.push(Term { atom: position, shift: atom & 0xf, columns, value, coefficient, factors_q15, adds });
+        let adds = coefficient as f64 * product * 32768.0
+            / 2f64.powi((atom & 0xf) as i32 + record.shift as i32)
+            / ONE_Q20;
+        terms.push(Term {
+            atom: position,
+            shift: atom & 0xf,
+            columns,
+            value,
+            coefficient,
+            factors_q15,
+            adds,
+        });
     });
     let adds = record_q20(words, channel, record, x.first, y.first, light, view) as f64 / ONE_Q20;
     let rounding = adds - terms.iter().map(|term| term.adds).sum::<f64>();
     terms.sort_by(|a, b| b.adds.abs().total_cmp(&a.adds.abs()).then(a.atom.cmp(&b.atom)));
-    Some(RecordReport { layer, dictionary: record.dictionary, shift: record.shift, count: record.count, adds, rounding, terms })
+    Some(RecordReport {
+        layer,
+        dictionary: record.dictionary,
+        shift: record.shift,
+        count: record.count,
+        adds,
+        rounding,
+        terms,
+    })
 }
 
 fn list_report(opened: &Selvedge<'_>, layer: u32, x: Axis, y: Axis, light: Taps, view: Taps) -> ListReport {
@@ -217,9 +269,16 @@ fn list_report(opened: &Selvedge<'_>, layer: u32, x: Axis, y: Axis, light: Taps,
         let coefficient = list_coefficient(value as u32, value_bits);
         // 12.5 without its roundings: Q15 times Q15, then both shifts, to Q20.
         let unit = 2f64.powi(-((gain_shift + shift) as i32)) / ONE_Q20;
-        AbrdfTerm { atom, gain_shift, coefficient, angular_q15, adds: angular_q15.map(|u| coefficient as f64 * u as f64 * unit) }
+        AbrdfTerm {
+            atom,
+            gain_shift,
+            coefficient,
+            angular_q15,
+            adds: angular_q15.map(|u| coefficient as f64 * u as f64 * unit),
+        }
     };
-    let mut terms: Vec<AbrdfTerm> = list(words, start, word(words, material.fibres_start), texel).into_iter().map(term).collect();
+    let mut terms: Vec<AbrdfTerm> =
+        list(words, start, word(words, material.fibres_start), texel).into_iter().map(term).collect();
     let decoded = layer_q20(words, material, 0, layer, x, y, light, view);
     let adds = [decoded.c0, decoded.c1, decoded.c2].map(|q20| q20 as f64 / ONE_Q20);
     let rounding = std::array::from_fn(|c| adds[c] - terms.iter().map(|term| term.adds[c]).sum::<f64>());
@@ -230,7 +289,9 @@ fn list_report(opened: &Selvedge<'_>, layer: u32, x: Axis, y: Axis, light: Taps,
 
 /// For people, at most `most` terms of a record.
 pub fn text(e: &Explanation, most: usize) -> String {
-    let taps = |taps: &[(u32, f64)]| taps.iter().map(|(i, weight)| format!("{i} x {weight:.4}")).collect::<Vec<_>>().join(", ");
+    let taps = |taps: &[(u32, f64)]| {
+        taps.iter().map(|(i, weight)| format!("{i} x {weight:.4}")).collect::<Vec<_>>().join(", ")
+    };
     let [r, g, b] = e.radiance;
     let mut text = format!(
         "texel {}, {}: block {}, texel {}, {} of it\n  light  {}\n  view   {}\n  radiance {r} {g} {b}\n",
@@ -253,7 +314,10 @@ pub fn text(e: &Explanation, most: usize) -> String {
             );
             for term in record.terms.iter().take(most) {
                 let [light, view, x, y] = term.columns;
-                text += &format!("    {:+.6}  atom {} (light {light}, view {view}, x {x}, y {y}), coefficient {}\n", term.adds, term.atom, term.coefficient);
+                text += &format!(
+                    "    {:+.6}  atom {} (light {light}, view {view}, x {x}, y {y}), coefficient {}\n",
+                    term.adds, term.atom, term.coefficient
+                );
             }
             let rest: f64 = record.terms.iter().skip(most).map(|term| term.adds).sum();
             if record.terms.len() > most {
@@ -265,7 +329,8 @@ pub fn text(e: &Explanation, most: usize) -> String {
     for list in &e.lists {
         text += &format!("layer {}: {} ABRDF atoms add {}\n", list.layer, list.terms.len(), three(list.adds));
         for term in list.terms.iter().take(most) {
-            text += &format!("    {}  atom {}, coefficient {}\n", three(term.adds), term.atom, term.coefficient);
+            text +=
+                &format!("    {}  atom {}, coefficient {}\n", three(term.adds), term.atom, term.coefficient);
         }
         if list.terms.len() > most {
             text += &format!("    and {} more\n", list.terms.len() - most);
@@ -293,19 +358,31 @@ mod tests {
             let opened = selvedge::open(&file, &Limits::NONE).expect("legal");
             let header = opened.header();
             for _ in 0..20 {
-                let texel = [random.range(0, header.width as i64 - 1) as u32, random.range(0, header.height as i64 - 1) as u32];
+                let texel = [
+                    random.range(0, header.width as i64 - 1) as u32,
+                    random.range(0, header.height as i64 - 1) as u32,
+                ];
                 let lights = opened.light_direction(random.word() % header.light_count);
                 let views = opened.view_direction(random.word() % header.view_count);
                 let e = explain(&opened, texel, lights, views);
                 for record in e.channels.iter().flat_map(|c| &c.records) {
                     terms += record.terms.len();
                     assert_eq!(record.terms.len(), record.count as usize);
-                    // Each of the 16 x 16 spatial sums rounds once or twice before the record's shift, each term once, and its angular
-                    // product by half a unit in Q15.
+                    // Each of the 16 x 16 spatial sums rounds once or twice before the record's shift, each
+                    // term once, and its angular product by half a unit in Q15.
                     let unit = 2f64.powi(-(record.shift as i32)) / ONE_Q20;
-                    let angular: f64 = record.terms.iter().map(|t| t.coefficient.abs() as f64 / 2.0 / 2f64.powi(t.shift as i32)).sum();
+                    let angular: f64 = record
+                        .terms
+                        .iter()
+                        .map(|t| t.coefficient.abs() as f64 / 2.0 / 2f64.powi(t.shift as i32))
+                        .sum();
                     let bound = (record.count as f64 * 2.0 + 600.0 + angular) * unit + 1.0 / ONE_Q20;
-                    assert!(record.rounding.abs() <= bound || record.adds.abs() >= 31.99, "seed {seed}: {} of {}", record.rounding, record.adds);
+                    assert!(
+                        record.rounding.abs() <= bound || record.adds.abs() >= 31.99,
+                        "seed {seed}: {} of {}",
+                        record.rounding,
+                        record.adds
+                    );
                 }
             }
         }

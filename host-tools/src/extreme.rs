@@ -4,8 +4,8 @@
 //! as random numbers get. What a seed gives is only promised to be legal, not to look like a material.
 
 use crate::model::{
-    AtomModel, AtomShifts, ChannelModel, CoefficientsModel, DictionaryModel, EnsembleModel, FactorModel, ListsModel, MaterialModel, MetadataModel,
-    PairTableModel, RecordModel, TensorModel, TransferModel,
+    AtomModel, AtomShifts, ChannelModel, CoefficientsModel, DictionaryModel, EnsembleModel, FactorModel,
+    ListsModel, MaterialModel, MetadataModel, PairTableModel, RecordModel, TensorModel, TransferModel,
 };
 use crate::random::Random;
 use selvedge::ensemble::dequantise;
@@ -45,28 +45,41 @@ impl Reach {
 /// A legal material by random numbers.
 pub fn extreme_model_from(r: &mut Random, reach: Reach) -> MaterialModel {
     let any_size = r.range(2, reach.texels as i64) as u32;
-    let size = [r.pick(&[any_size, any_size, 1, 2, 17]), r.pick(&[any_size / 2 + 1, any_size, 1, 3, 33])].map(|s| s.min(reach.texels));
+    let size = [r.pick(&[any_size, any_size, 1, 2, 17]), r.pick(&[any_size / 2 + 1, any_size, 1, 3, 33])]
+        .map(|s| s.min(reach.texels));
     let edge = r.range(1, 16) as u32;
     let most_levels = 1 + size[0].max(size[1]).next_power_of_two().trailing_zeros();
     let level_count = r.pick(&[1, 1, most_levels, r.clone().range(1, most_levels as i64) as u32]);
     let layer_count = r.pick(&[1, 1, 1, 2, 3, 8]);
     let offset = r.pick(&[0.0, 1.0, f32::MIN_POSITIVE, 1e-5, 0.7]);
-    let transfer = if r.once_in(3) { TransferModel::Linear { exponent: r.pick(&[-60, -7, 0, 13, 60]) } } else { TransferModel::Log2 { offset } };
+    let transfer = if r.once_in(3) {
+        TransferModel::Linear { exponent: r.pick(&[-60, -7, 0, 13, 60]) }
+    } else {
+        TransferModel::Log2 { offset }
+    };
     let plain_matrix = r.once_in(2);
-    let matrix_q13 = std::array::from_fn(|_| if plain_matrix { r.pick(&[0, 8192, 8192, -4096]) } else { r.entry() });
+    let matrix_q13 =
+        std::array::from_fn(|_| if plain_matrix { r.pick(&[0, 8192, 8192, -4096]) } else { r.entry() });
     let lights = extreme_directions(r, reach);
     let views = if r.once_in(3) { None } else { Some(extreme_directions(r, reach)) };
     let view_count = views.as_ref().map_or(lights.len(), Vec::len);
-    let blocks: Vec<u32> = (0..level_count).map(|level| size.map(|s| level_size(s, level).div_ceil(edge)).iter().product()).collect();
+    let blocks: Vec<u32> = (0..level_count)
+        .map(|level| size.map(|s| level_size(s, level).div_ceil(edge)).iter().product())
+        .collect();
     let channels = std::array::from_fn(|_| {
         let state = r.pick(&[0, 1, 2, 2, 2, 2]);
         ChannelModel {
             mean: (state > 0).then(|| extreme_table(r, lights.len(), view_count, false)),
             scale: (state == 2 && r.once_in(2)).then(|| extreme_table(r, lights.len(), view_count, true)),
-            ensemble: (state == 2).then(|| extreme_ensemble(r, edge, lights.len(), view_count, &blocks, layer_count, reach)),
+            ensemble: (state == 2)
+                .then(|| extreme_ensemble(r, edge, lights.len(), view_count, &blocks, layer_count, reach)),
         }
     });
-    let extras = if r.once_in(4) { vec![(0x8001, 7, vec![1; 4 * r.range(0, 9) as usize]), (0xffff, 0xffff, Vec::new())] } else { Vec::new() };
+    let extras = if r.once_in(4) {
+        vec![(0x8001, 7, vec![1; 4 * r.range(0, 9) as usize]), (0xffff, 0xffff, Vec::new())]
+    } else {
+        Vec::new()
+    };
     MaterialModel {
         size,
         level_count,
@@ -102,28 +115,52 @@ pub fn extreme_of_any_method(seed: u64) -> MaterialModel {
     if seed % 3 == 2 { extreme_tensor(seed) } else { extreme_model(seed) }
 }
 
-/// A legal sparse tensor by random numbers: shared parts as [`extreme_model_from`] makes them, other textures.
+/// A legal sparse tensor by random numbers: shared parts as [`extreme_model_from`] makes them, other
+/// textures.
 pub fn extreme_tensor_from(r: &mut Random, reach: Reach) -> MaterialModel {
     let mut model = extreme_model_from(r, reach);
     let channels = std::array::from_fn(|c| model.state(c) == 2);
     model.channels.iter_mut().for_each(|channel| channel.ensemble = None);
     model.edge = 1;
-    let texels: Vec<u32> = (0..model.level_count).map(|level| model.size.map(|s| level_size(s, level)).iter().product()).collect();
+    let texels: Vec<u32> = (0..model.level_count)
+        .map(|level| model.size.map(|s| level_size(s, level)).iter().product())
+        .collect();
     let textured = channels.contains(&true);
     let (lights, views) = (model.lights.len(), model.views().len());
-    model.tensor = Some(TensorModel { channels, ..if textured { extreme_atoms_of_tensor(r, channels, lights, views, reach) } else { TensorModel::default() } });
+    model.tensor = Some(TensorModel {
+        channels,
+        ..if textured {
+            extreme_atoms_of_tensor(r, channels, lights, views, reach)
+        } else {
+            TensorModel::default()
+        }
+    });
     if let Some(tensor) = model.tensor.as_mut().filter(|_| textured) {
-        tensor.lists = texels.iter().map(|&count| (0..model.layer_count).map(|_| extreme_lists(r, tensor, count)).collect()).collect();
+        tensor.lists = texels
+            .iter()
+            .map(|&count| (0..model.layer_count).map(|_| extreme_lists(r, tensor, count)).collect())
+            .collect();
     }
     model
 }
 
-fn extreme_atoms_of_tensor(r: &mut Random, channels: [bool; 3], lights: usize, views: usize, reach: Reach) -> TensorModel {
+fn extreme_atoms_of_tensor(
+    r: &mut Random,
+    channels: [bool; 3],
+    lights: usize,
+    views: usize,
+    reach: Reach,
+) -> TensorModel {
     let light_atoms = r.pick(&[1, 2, 3, 16, 40, 255, 256]).min(reach.columns * 5) as u32;
-    let ten_bits = |r: &mut Random| r.pick(&[-512, 511, 0, r.clone().range(-512, 511), r.clone().range(-9, 9)]) as i16;
+    let ten_bits =
+        |r: &mut Random| r.pick(&[-512, 511, 0, r.clone().range(-512, 511), r.clone().range(-9, 9)]) as i16;
     let entry = |r: &mut Random| std::array::from_fn(|c| if channels[c] { ten_bits(r) } else { 0 });
     let entries = r.pick(&[1, 2, 3, 9, 32]);
-    let atoms = r.pick(&[1, 2, 7, 64, 65, 300, 1024]).min(reach.atoms * 3).min(300_000 / (views as i64 * entries)).max(1);
+    let atoms = r
+        .pick(&[1, 2, 7, 64, 65, 300, 1024])
+        .min(reach.atoms * 3)
+        .min(300_000 / (views as i64 * entries))
+        .max(1);
     let index_bits = 32 - (light_atoms - 1).leading_zeros();
     let mask = (1u32 << index_bits) - 1;
     let full = r.once_in(3);
@@ -141,13 +178,20 @@ fn extreme_atoms_of_tensor(r: &mut Random, channels: [bool; 3], lights: usize, v
             fibres.push((value | r.range(0, light_atoms as i64 - 1) as u32) as u16);
         }
     }
-    let shift = |r: &mut Random| r.pick(&[0, 15, 31, r.clone().range(8, 18), r.clone().range(8, 18), r.clone().range(0, 31)]) as u32;
+    let shift = |r: &mut Random| {
+        r.pick(&[0, 15, 31, r.clone().range(8, 18), r.clone().range(8, 18), r.clone().range(0, 31)]) as u32
+    };
     TensorModel {
         channels,
         light_atoms,
         lights: (0..lights * light_atoms as usize).map(|_| entry(r)).collect(),
         entries: entries as u32,
-        atoms: (0..atoms).map(|_| AtomShifts { angular: shift(r), gain: r.pick(&[0, 31, r.clone().range(0, 31), r.clone().range(0, 3)]) as u32 }).collect(),
+        atoms: (0..atoms)
+            .map(|_| AtomShifts {
+                angular: shift(r),
+                gain: r.pick(&[0, 31, r.clone().range(0, 31), r.clone().range(0, 3)]) as u32,
+            })
+            .collect(),
         fibres,
         lists: Vec::new(),
     }
@@ -163,13 +207,21 @@ fn extreme_lists(r: &mut Random, tensor: &TensorModel, texels: u32) -> ListsMode
             indices.extend(0..63);
         }
         for _ in 0..r.range(0, most - indices.len() as i64) {
-            indices.insert(r.pick(&[0, last, r.clone().range(0, last), r.clone().range(0, last.min(6))]) as u32);
+            indices
+                .insert(r.pick(&[0, last, r.clone().range(0, last), r.clone().range(0, last.min(6))]) as u32);
         }
         let mut sum = 0;
         let mut coefficients = Vec::new();
         for index in indices {
-            let value = r.pick(&[0, (1 << value_bits) - 1, 1 << (value_bits - 1), r.clone().range(0, (1 << value_bits) - 1)]) as u32;
-            let part = list_coefficient(value, value_bits).unsigned_abs().div_ceil(1 << tensor.atoms[index as usize].gain);
+            let value = r.pick(&[
+                0,
+                (1 << value_bits) - 1,
+                1 << (value_bits - 1),
+                r.clone().range(0, (1 << value_bits) - 1),
+            ]) as u32;
+            let part = list_coefficient(value, value_bits)
+                .unsigned_abs()
+                .div_ceil(1 << tensor.atoms[index as usize].gain);
             if sum + part <= LIST_SUM_LIMIT {
                 sum += part;
                 coefficients.push((index, value as u16));
@@ -198,7 +250,20 @@ fn extreme_directions(r: &mut Random, reach: Reach) -> Vec<[i32; 2]> {
         4 => points.extend([[3, 5], [4, 5], [3, 6], [4, 6], [5, 5]]),
         5 => {
             // Pythagorean points: exactly co-circular.
-            let base = [[3, 4], [4, 3], [5, 0], [4, -3], [3, -4], [0, -5], [-3, -4], [-4, -3], [-5, 0], [-4, 3], [-3, 4], [0, 5]];
+            let base = [
+                [3, 4],
+                [4, 3],
+                [5, 0],
+                [4, -3],
+                [3, -4],
+                [0, -5],
+                [-3, -4],
+                [-4, -3],
+                [-5, 0],
+                [-4, 3],
+                [-3, 4],
+                [0, 5],
+            ];
             let scale = r.range(1, 3276) as i32;
             points.extend(base.map(|p| p.map(|c| c * scale)));
         }
@@ -208,13 +273,21 @@ fn extreme_directions(r: &mut Random, reach: Reach) -> Vec<[i32; 2]> {
             for ring in 1..=r.range(1, 6) {
                 let n = ring * 6;
                 let radius = ring as f64 * 2100.0;
-                points.extend((0..n).map(|i| (i as f64 / n as f64 * std::f64::consts::TAU).sin_cos()).map(|(s, c)| [(c * radius) as i32, (s * radius) as i32]));
+                points.extend(
+                    (0..n)
+                        .map(|i| (i as f64 / n as f64 * std::f64::consts::TAU).sin_cos())
+                        .map(|(s, c)| [(c * radius) as i32, (s * radius) as i32]),
+                );
             }
         }
-        7 => points.extend((0..r.range(3, 60)).map(|_| [r.range(-60, 60) as i32 * 190, r.range(-60, 60) as i32 * 190])),
+        7 => points.extend(
+            (0..r.range(3, 60)).map(|_| [r.range(-60, 60) as i32 * 190, r.range(-60, 60) as i32 * 190]),
+        ),
         _ => {
             let reach = r.pick(&[40, 2000, 16_384]);
-            points.extend((0..r.range(4, 90)).map(|_| [r.range(-reach, reach) as i32, r.range(-reach, reach) as i32]));
+            points.extend(
+                (0..r.range(4, 90)).map(|_| [r.range(-reach, reach) as i32, r.range(-reach, reach) as i32]),
+            );
         }
     }
     let mut seen = BTreeSet::new();
@@ -237,10 +310,21 @@ fn extreme_table(r: &mut Random, lights: usize, views: usize, is_scale: bool) ->
 fn extreme_factor(r: &mut Random, rows: usize, most_columns: i64) -> FactorModel {
     let columns = r.range(1, most_columns) as u32;
     let constant = r.once_in(4).then(|| r.pick(&[32_767i16, -32_767]));
-    FactorModel { columns, entries: (0..rows * columns as usize).map(|_| constant.unwrap_or_else(|| r.entry())).collect() }
+    FactorModel {
+        columns,
+        entries: (0..rows * columns as usize).map(|_| constant.unwrap_or_else(|| r.entry())).collect(),
+    }
 }
 
-fn extreme_ensemble(r: &mut Random, edge: u32, lights: usize, views: usize, blocks: &[u32], layers: u32, reach: Reach) -> EnsembleModel {
+fn extreme_ensemble(
+    r: &mut Random,
+    edge: u32,
+    lights: usize,
+    views: usize,
+    blocks: &[u32],
+    layers: u32,
+    reach: Reach,
+) -> EnsembleModel {
     let dictionaries: Vec<DictionaryModel> = (0..r.range(1, 4))
         .map(|_| {
             let most = r.pick(&[3, 20, 60]).min(reach.columns);
@@ -257,7 +341,12 @@ fn extreme_ensemble(r: &mut Random, edge: u32, lights: usize, views: usize, bloc
     let coefficients = blocks
         .iter()
         .map(|&count| {
-            (0..layers).map(|_| CoefficientsModel { value_bits, records: (0..count).map(|_| extreme_record(r, &atoms, value_bits)).collect() }).collect()
+            (0..layers)
+                .map(|_| CoefficientsModel {
+                    value_bits,
+                    records: (0..count).map(|_| extreme_record(r, &atoms, value_bits)).collect(),
+                })
+                .collect()
         })
         .collect();
     EnsembleModel { dictionaries, atoms, coefficients }
@@ -271,7 +360,15 @@ fn extreme_atoms(r: &mut Random, d: &DictionaryModel, reach: Reach) -> Vec<AtomM
         let base = r.entry();
         let room = 32_767 - base as i64;
         let step = r.pick(&[0, room, r.clone().range(0, room)]) as u16;
-        let atom = AtomModel { light, view, x, y, shift: r.pick(&[0, 15, r.clone().range(0, 15) as u32]), base, step };
+        let atom = AtomModel {
+            light,
+            view,
+            x,
+            y,
+            shift: r.pick(&[0, 15, r.clone().range(0, 15) as u32]),
+            base,
+            step,
+        };
         of_key.insert(atom.word() >> 4, atom);
     }
     of_key.into_values().collect()
@@ -289,7 +386,8 @@ fn extreme_record(r: &mut Random, atoms: &[Vec<AtomModel>], value_bits: u32) -> 
     let mut coefficients = Vec::new();
     for (position, atom) in (0u32..).zip(list) {
         let value = r.pick(&[0, most, r.clone().range(0, most as i64) as u32]) as u16;
-        let part = dequantise(atom.quantiser(), value as u32, value_bits).unsigned_abs().div_ceil(1 << atom.shift);
+        let part =
+            dequantise(atom.quantiser(), value as u32, value_bits).unsigned_abs().div_ceil(1 << atom.shift);
         if r.once_in(keep) && sum + part <= SUM_LIMIT {
             sum += part;
             coefficients.push((position, value));

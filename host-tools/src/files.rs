@@ -32,7 +32,10 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     }
     let path = target.as_path();
     let folder = folder_of(path);
-    let mut beside = tempfile::Builder::new().prefix(".selvedge-").tempfile_in(folder).map_err(|error| ToolError::io(path)(error.kind().into()))?;
+    let mut beside = tempfile::Builder::new()
+        .prefix(".selvedge-")
+        .tempfile_in(folder)
+        .map_err(|error| ToolError::io(path)(error.kind().into()))?;
     beside.write_all(bytes).and_then(|()| beside.as_file().sync_all()).map_err(ToolError::io(path))?;
     persist(beside, path)
 }
@@ -83,7 +86,10 @@ pub fn persist(beside: tempfile::NamedTempFile, path: &Path) -> Result<()> {
     {
         use std::os::unix::fs::PermissionsExt as _;
         let mode = std::fs::metadata(path).map_or(0o644, |old| old.permissions().mode());
-        beside.as_file().set_permissions(std::fs::Permissions::from_mode(mode)).map_err(ToolError::io(path))?;
+        beside
+            .as_file()
+            .set_permissions(std::fs::Permissions::from_mode(mode))
+            .map_err(ToolError::io(path))?;
     }
     beside.persist(path).map_err(|error| ToolError::io(path)(error.error))?;
     Ok(())

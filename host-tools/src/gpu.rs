@@ -115,7 +115,10 @@ impl Gpu {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
         descriptor.backends = backends;
         let instance = wgpu::Instance::new(descriptor);
-        let options = wgpu::RequestAdapterOptions { power_preference: wgpu::PowerPreference::HighPerformance, ..Default::default() };
+        let options = wgpu::RequestAdapterOptions {
+            power_preference: wgpu::PowerPreference::HighPerformance,
+            ..Default::default()
+        };
         let Ok(adapter) = pollster::block_on(instance.request_adapter(&options)) else {
             return Ok(None);
         };
@@ -130,9 +133,13 @@ impl Gpu {
             ..wgpu::Limits::downlevel_defaults()
         };
         let descriptor = wgpu::DeviceDescriptor { required_limits, ..Default::default() };
-        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).map_err(|e| ToolError::Kernel(e.to_string()))?;
+        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
+            .map_err(|e| ToolError::Kernel(e.to_string()))?;
         let source = crate::kernel::source();
-        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some("selvedge"), source: wgpu::ShaderSource::Wgsl(source.into()) });
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some("selvedge"),
+            source: wgpu::ShaderSource::Wgsl(source.into()),
+        });
         let entries: Vec<wgpu::BindGroupLayoutEntry> = (0..4)
             .map(|binding| wgpu::BindGroupLayoutEntry {
                 binding,
@@ -145,9 +152,13 @@ impl Gpu {
                 count: None,
             })
             .collect();
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &entries });
-        let pipeline_layout =
-            device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor { label: None, bind_group_layouts: &[Some(&layout)], immediate_size: 0 });
+        let layout = device
+            .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &entries });
+        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: None,
+            bind_group_layouts: &[Some(&layout)],
+            immediate_size: 0,
+        });
         let description = format!("{} ({:?}, {:?})", info.name, info.backend, info.device_type);
         let pipelines = Mutex::default();
         Ok(Some(Gpu { device, queue, module, layout, pipeline_layout, pipelines, description }))
@@ -168,9 +179,16 @@ impl Gpu {
         // One word past the end may be read by a window.
         files.extend([0; 16]);
         let buffer = |label, contents: &[u8]| {
-            self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage: wgpu::BufferUsages::STORAGE })
+            self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some(label),
+                contents,
+                usage: wgpu::BufferUsages::STORAGE,
+            })
         };
-        Loaded { files: buffer("files", &files), materials: buffer("materials", bytemuck::cast_slice(&records)) }
+        Loaded {
+            files: buffer("files", &files),
+            materials: buffer("materials", bytemuck::cast_slice(&records)),
+        }
     }
 
     /// The pipeline of an entry point, compiled when it is first asked for.
@@ -189,11 +207,21 @@ impl Gpu {
         pipelines.entry(entry.to_owned()).or_insert_with(compile).clone()
     }
 
-    fn run(&self, loaded: &Loaded, entry: &str, queries: &[Query], answers: usize, groups: [u32; 2]) -> Result<Vec<Answer>> {
+    fn run(
+        &self,
+        loaded: &Loaded,
+        entry: &str,
+        queries: &[Query],
+        answers: usize,
+        groups: [u32; 2],
+    ) -> Result<Vec<Answer>> {
         let pipeline = self.pipeline(entry);
         let contents = bytemuck::cast_slice(queries);
-        let query_buffer =
-            self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some("queries"), contents, usage: wgpu::BufferUsages::STORAGE });
+        let query_buffer = self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some("queries"),
+            contents,
+            usage: wgpu::BufferUsages::STORAGE,
+        });
         let size = (answers * size_of::<Answer>()) as u64;
         let answer_buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("answers"),
@@ -202,11 +230,22 @@ impl Gpu {
             mapped_at_creation: false,
         });
         let usage = wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ;
-        let read_buffer = self.device.create_buffer(&wgpu::BufferDescriptor { label: Some("read"), size, usage, mapped_at_creation: false });
+        let read_buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("read"),
+            size,
+            usage,
+            mapped_at_creation: false,
+        });
         let buffers = [&loaded.files, &loaded.materials, &query_buffer, &answer_buffer];
-        let entries: Vec<wgpu::BindGroupEntry<'_>> =
-            (0u32..).zip(buffers).map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() }).collect();
-        let group = self.device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout: &self.layout, entries: &entries });
+        let entries: Vec<wgpu::BindGroupEntry<'_>> = (0u32..)
+            .zip(buffers)
+            .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
+            .collect();
+        let group = self.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &self.layout,
+            entries: &entries,
+        });
         let mut encoder = self.device.create_command_encoder(&Default::default());
         {
             let mut pass = encoder.begin_compute_pass(&Default::default());
@@ -217,8 +256,11 @@ impl Gpu {
         encoder.copy_buffer_to_buffer(&answer_buffer, 0, &read_buffer, 0, size);
         self.queue.submit([encoder.finish()]);
         read_buffer.slice(..).map_async(wgpu::MapMode::Read, |_| {});
-        self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| ToolError::Kernel(e.to_string()))?;
-        let mapped = read_buffer.slice(..).get_mapped_range().map_err(|e| ToolError::Kernel(e.to_string()))?;
+        self.device
+            .poll(wgpu::PollType::wait_indefinitely())
+            .map_err(|e| ToolError::Kernel(e.to_string()))?;
+        let mapped =
+            read_buffer.slice(..).get_mapped_range().map_err(|e| ToolError::Kernel(e.to_string()))?;
         Ok(bytemuck::cast_slice(&mapped).to_vec())
     }
 
@@ -227,7 +269,13 @@ impl Gpu {
         let mut answers = Vec::with_capacity(queries.len());
         // A dispatch of at most 2^16 - 1 groups of 64; smaller ones keep watchdogs of real devices quiet.
         for chunk in queries.chunks(1 << 18) {
-            answers.extend(self.run(loaded, entry, chunk, chunk.len(), [(chunk.len() as u32).div_ceil(64), 1])?);
+            answers.extend(self.run(
+                loaded,
+                entry,
+                chunk,
+                chunk.len(),
+                [(chunk.len() as u32).div_ceil(64), 1],
+            )?);
         }
         Ok(answers)
     }
@@ -251,7 +299,8 @@ pub fn random_query(random: &mut Random, entry: &str, material: u32) -> Query {
             let r = (1.0 - z * z).max(0.0).sqrt();
             [r * azimuth.cos(), r * azimuth.sin(), z].map(f32::to_bits)
         }
-        _ => [random.range(-262_400, 262_400), random.range(-262_400, 262_400), random.range(-9, 32_800)].map(|c| c as u32),
+        _ => [random.range(-262_400, 262_400), random.range(-262_400, 262_400), random.range(-9, 32_800)]
+            .map(|c| c as u32),
     };
     let (light, view) = (direction(), direction());
     let (u, v) = match entry {

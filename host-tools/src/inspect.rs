@@ -1,7 +1,10 @@
 //! What `info` tells: the same facts as text and as JSON.
 
 use selvedge::Selvedge;
-use selvedge::directory::{ANGULAR, ATOMS, COEFFICIENTS, DIRECTIONS, EXTERNAL, FIBRES, LIGHT_ATOMS, LISTS, MEANS, METADATA, OPTIONAL, SCALES, SPATIAL};
+use selvedge::directory::{
+    ANGULAR, ATOMS, COEFFICIENTS, DIRECTIONS, EXTERNAL, FIBRES, LIGHT_ATOMS, LISTS, MEANS, METADATA,
+    OPTIONAL, SCALES, SPATIAL,
+};
 use selvedge::header::METHOD_SPARSE_TENSOR;
 use serde::Serialize;
 
@@ -76,7 +79,10 @@ fn section_names(kind: u32, instance: u32) -> (String, String) {
         ANGULAR => channel("angular factors"),
         SPATIAL => channel("spatial factors"),
         ATOMS => channel("atoms"),
-        COEFFICIENTS => ("coefficients".into(), format!("level {}, layer {}, channel {}", instance >> 8, instance >> 4 & 15, instance & 15)),
+        COEFFICIENTS => (
+            "coefficients".into(),
+            format!("level {}, layer {}, channel {}", instance >> 8, instance >> 4 & 15, instance & 15),
+        ),
         LIGHT_ATOMS => ("light atoms".into(), String::new()),
         FIBRES => ("fibres".into(), String::new()),
         LISTS => ("lists".into(), format!("level {}, layer {}", instance >> 8, instance >> 4 & 15)),
@@ -99,7 +105,9 @@ pub fn info(material: &Selvedge<'_>) -> Info {
         layers: header.layer_count,
         edge: header.edge,
         directions: [header.light_count, header.view_count],
-        channels: header.states.map(|state| ["missing", "mean", "full"].get(state as usize).copied().unwrap_or("?")),
+        channels: header
+            .states
+            .map(|state| ["missing", "mean", "full"].get(state as usize).copied().unwrap_or("?")),
         transfer: if header.transfer == 0 { "log2" } else { "linear" },
         cosine_included: header.cosine_included != 0,
         operations: header.operations,
@@ -140,7 +148,8 @@ pub fn info_text(info: &Info) -> String {
         info.decode_digest,
     );
     for section in &info.sections {
-        text += &format!("  {:>9}  {:>9}  {} {}\n", section.offset, section.length, section.kind, section.which);
+        text +=
+            &format!("  {:>9}  {:>9}  {} {}\n", section.offset, section.length, section.kind, section.which);
     }
     text
 }

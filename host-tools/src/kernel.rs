@@ -13,8 +13,10 @@ fn fail(what: impl std::fmt::Debug) -> ToolError {
 }
 
 fn validated(source: &str) -> Result<(naga::Module, ModuleInfo)> {
-    let module = naga::front::wgsl::parse_str(source).map_err(|error| ToolError::Kernel(error.emit_to_string(source)))?;
-    let info = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module).map_err(fail)?;
+    let module = naga::front::wgsl::parse_str(source)
+        .map_err(|error| ToolError::Kernel(error.emit_to_string(source)))?;
+    let info =
+        Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module).map_err(fail)?;
     Ok((module, info))
 }
 
@@ -26,21 +28,27 @@ pub fn source() -> String {
     assemble(&Request { methods: METHODS, entries: true })
 }
 
-/// Every translation: `selvedge.wgsl` (with entry points), `selvedge_functions.wgsl` (without), `selvedge.spv`,
-/// `selvedge.metal`, `selvedge.hlsl`, and one `selvedge_NAME.comp` in GLSL ES 3.1 for each entry point.
+/// Every translation: `selvedge.wgsl` (with entry points), `selvedge_functions.wgsl` (without),
+/// `selvedge.spv`, `selvedge.metal`, `selvedge.hlsl`, and one `selvedge_NAME.comp` in GLSL ES 3.1 for each
+/// entry point.
 pub fn translate() -> Result<Vec<KernelFile>> {
     let source = source();
     let functions = assemble(&Request { methods: METHODS, entries: false });
     validated(&functions)?;
     let (module, info) = validated(&source)?;
-    let mut files = vec![("selvedge.wgsl".to_owned(), source.into_bytes()), ("selvedge_functions.wgsl".to_owned(), functions.into_bytes())];
+    let mut files = vec![
+        ("selvedge.wgsl".to_owned(), source.into_bytes()),
+        ("selvedge_functions.wgsl".to_owned(), functions.into_bytes()),
+    ];
 
     let options = back::spv::Options { lang_version: (1, 3), ..Default::default() };
     let words = back::spv::write_vec(&module, &info, &options, None).map_err(fail)?;
     files.push(("selvedge.spv".into(), words.iter().flat_map(|word| word.to_le_bytes()).collect()));
 
-    let options = back::msl::Options { lang_version: (2, 1), fake_missing_bindings: true, ..Default::default() };
-    let (text, _) = back::msl::write_string(&module, &info, &options, &back::msl::PipelineOptions::default()).map_err(fail)?;
+    let options =
+        back::msl::Options { lang_version: (2, 1), fake_missing_bindings: true, ..Default::default() };
+    let (text, _) = back::msl::write_string(&module, &info, &options, &back::msl::PipelineOptions::default())
+        .map_err(fail)?;
     files.push(("selvedge.metal".into(), text.into_bytes()));
 
     let mut text = String::new();
@@ -51,10 +59,20 @@ pub fn translate() -> Result<Vec<KernelFile>> {
 
     for entry in ENTRY_POINTS {
         let mut text = String::new();
-        let options = back::glsl::Options { version: back::glsl::Version::Embedded { version: 310, is_webgl: false }, ..Default::default() };
-        let pipeline = back::glsl::PipelineOptions { shader_stage: naga::ShaderStage::Compute, entry_point: entry.into(), multiview: None };
+        let options = back::glsl::Options {
+            version: back::glsl::Version::Embedded { version: 310, is_webgl: false },
+            ..Default::default()
+        };
+        let pipeline = back::glsl::PipelineOptions {
+            shader_stage: naga::ShaderStage::Compute,
+            entry_point: entry.into(),
+            multiview: None,
+        };
         let policies = naga::proc::BoundsCheckPolicies::default();
-        back::glsl::Writer::new(&mut text, &module, &info, &options, &pipeline, policies).map_err(fail)?.write().map_err(fail)?;
+        back::glsl::Writer::new(&mut text, &module, &info, &options, &pipeline, policies)
+            .map_err(fail)?
+            .write()
+            .map_err(fail)?;
         files.push((format!("selvedge_{entry}.comp"), text.into_bytes()));
     }
     files.push(("README.txt".into(), BINDINGS.into()));

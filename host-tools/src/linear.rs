@@ -15,11 +15,13 @@ pub fn multiply(out: MatMut<'_, f32>, a: MatRef<'_, f32>, b: MatRef<'_, f32>, ad
     clean_registers();
 }
 
-/// Clears the upper halves of the vector registers, to be called after `faer` has worked, which is why nothing but this module lets it work.
+/// Clears the upper halves of the vector registers, to be called after `faer` has worked, which is why
+/// nothing but this module lets it work.
 ///
-/// Its microkernels for x86 return without `vzeroupper` (seen with faer 0.24), and from then on every scalar instruction of the thread waits for
-/// registers that it does not read: the import of a `.btf` took four times as long. A conversion from binary16 is compiled to leave them clean, and is
-/// the only instruction sequence of that kind that can be had here without `unsafe`. It costs eight conversions.
+/// Its microkernels for x86 return without `vzeroupper` (seen with faer 0.24), and from then on every scalar
+/// instruction of the thread waits for registers that it does not read: the import of a `.btf` took four
+/// times as long. A conversion from binary16 is compiled to leave them clean, and is the only instruction
+/// sequence of that kind that can be had here without `unsafe`. It costs eight conversions.
 fn clean_registers() {
     let mut numbers = [0.0; 8];
     [half::f16::ONE; 8].convert_to_f32_slice(&mut numbers);
@@ -58,12 +60,20 @@ pub struct Basis {
 impl Basis {
     /// The identity.
     pub fn identity(n: usize) -> Basis {
-        Basis { rows: n, columns: n, entries: (0..n * n).map(|i| if i / n == i % n { 1.0 } else { 0.0 }).collect() }
+        Basis {
+            rows: n,
+            columns: n,
+            entries: (0..n * n).map(|i| if i / n == i % n { 1.0 } else { 0.0 }).collect(),
+        }
     }
 
     /// From a function of row and column.
     pub fn from_fn(rows: usize, columns: usize, entry: impl Fn(usize, usize) -> f32) -> Basis {
-        Basis { rows, columns, entries: (0..rows * columns).map(|i| entry(i / columns, i % columns)).collect() }
+        Basis {
+            rows,
+            columns,
+            entries: (0..rows * columns).map(|i| entry(i / columns, i % columns)).collect(),
+        }
     }
 
     /// One entry.
@@ -99,13 +109,16 @@ impl Basis {
 
     /// Largest deviation of `transpose(self) * self` from the identity.
     pub fn defect(&self) -> f64 {
-        let dot = |a: usize, b: usize| (0..self.rows).map(|r| self.at(r, a) as f64 * self.at(r, b) as f64).sum::<f64>();
+        let dot = |a: usize, b: usize| {
+            (0..self.rows).map(|r| self.at(r, a) as f64 * self.at(r, b) as f64).sum::<f64>()
+        };
         let pairs = (0..self.columns).flat_map(|a| (0..=a).map(move |b| (a, b)));
         pairs.map(|(a, b)| (dot(a, b) - if a == b { 1.0 } else { 0.0 }).abs()).fold(0.0, f64::max)
     }
 }
 
-/// Eigenvectors of a symmetric matrix by descending eigenvalue, each with its largest entry positive, and the eigenvalues.
+/// Eigenvectors of a symmetric matrix by descending eigenvalue, each with its largest entry positive, and the
+/// eigenvalues.
 ///
 /// The matrix is `n x n`; what rounding makes negative becomes zero.
 pub fn eigenbasis(matrix: &[f64], n: usize) -> (Basis, Vec<f64>) {
@@ -136,17 +149,22 @@ pub fn nearest_orthogonal(matrix: &[f64], n: usize) -> Option<Basis> {
     let svd = m.svd().ok()?;
     let u = svd.U() * svd.V().transpose();
     clean_registers();
-    u.as_ref().col_iter().all(|c| c.iter().all(|x| x.is_finite())).then(|| Basis::from_fn(n, n, |r, c| u[(r, c)] as f32))
+    u.as_ref()
+        .col_iter()
+        .all(|c| c.iter().all(|x| x.is_finite()))
+        .then(|| Basis::from_fn(n, n, |r, c| u[(r, c)] as f32))
 }
 
 /// Orthonormal columns with the span of a tall matrix of so many columns, row-major.
 pub fn orthonormal(matrix: &[f64], columns: usize) -> Mat<f64> {
-    let q = Mat::from_fn(matrix.len() / columns, columns, |r, c| matrix[r * columns + c]).qr().compute_thin_Q();
+    let q =
+        Mat::from_fn(matrix.len() / columns, columns, |r, c| matrix[r * columns + c]).qr().compute_thin_Q();
     clean_registers();
     q
 }
 
-/// The solution of an `n x n` symmetric system for right sides of `n` rows, row-major; nothing if the matrix is not positive definite.
+/// The solution of an `n x n` symmetric system for right sides of `n` rows, row-major; nothing if the matrix
+/// is not positive definite.
 pub fn solve_symmetric(matrix: impl Fn(usize, usize) -> f64, right: &[f64], n: usize) -> Option<Mat<f64>> {
     let columns = right.len() / n;
     let right = Mat::from_fn(n, columns, |r, c| right[r * columns + c]);
@@ -160,7 +178,12 @@ pub fn solve_symmetric(matrix: impl Fn(usize, usize) -> f64, right: &[f64], n: u
 pub const WAVE: usize = 16;
 
 /// `fold(total, work(i))` for `i` ascending, the work in parallel: the same bits for any number of threads.
-pub fn ordered<T: Send, E: Send, A>(count: usize, work: impl Fn(usize) -> Result<T, E> + Sync, total: A, fold: impl FnMut(&mut A, usize, T)) -> Result<A, E> {
+pub fn ordered<T: Send, E: Send, A>(
+    count: usize,
+    work: impl Fn(usize) -> Result<T, E> + Sync,
+    total: A,
+    fold: impl FnMut(&mut A, usize, T),
+) -> Result<A, E> {
     ordered_in(WAVE, count, work, total, fold)
 }
 
@@ -173,7 +196,8 @@ pub fn ordered_in<T: Send, E: Send, A>(
     mut fold: impl FnMut(&mut A, usize, T),
 ) -> Result<A, E> {
     for first in (0..count).step_by(wave) {
-        let results: Vec<T> = (first..(first + wave).min(count)).into_par_iter().map(&work).collect::<Result<_, E>>()?;
+        let results: Vec<T> =
+            (first..(first + wave).min(count)).into_par_iter().map(&work).collect::<Result<_, E>>()?;
         results.into_iter().enumerate().for_each(|(i, result)| fold(&mut total, first + i, result));
     }
     Ok(total)
@@ -192,7 +216,10 @@ mod tests {
     #[test]
     fn products_agree_with_their_definition() {
         let (m, k, n) = (5, 7, 3);
-        let (a, b): (Vec<f32>, Vec<f32>) = (random(m * k, 1).iter().map(|&x| x as f32).collect(), random(k * n, 2).iter().map(|&x| x as f32).collect());
+        let (a, b): (Vec<f32>, Vec<f32>) = (
+            random(m * k, 1).iter().map(|&x| x as f32).collect(),
+            random(k * n, 2).iter().map(|&x| x as f32).collect(),
+        );
         let at: Vec<f32> = (0..k * m).map(|i| a[i % m * k + i / m]).collect();
         let bt: Vec<f32> = (0..n * k).map(|i| b[i % k * n + i / k]).collect();
         let (mut plain, mut by_at, mut by_bt) = (vec![0.0; m * n], vec![1.0; m * n], vec![0.0; m * n]);
@@ -201,7 +228,11 @@ mod tests {
         product_bt(&mut by_bt, &a, &bt, [m, k, n], false);
         for i in 0..m * n {
             let wanted: f32 = (0..k).map(|j| a[i / n * k + j] * b[j * n + i % n]).sum();
-            assert!((plain[i] - wanted).abs() < 1e-5 && (by_at[i] - 1.0 - wanted).abs() < 1e-5 && (by_bt[i] - wanted).abs() < 1e-5);
+            assert!(
+                (plain[i] - wanted).abs() < 1e-5
+                    && (by_at[i] - 1.0 - wanted).abs() < 1e-5
+                    && (by_bt[i] - wanted).abs() < 1e-5
+            );
         }
     }
 

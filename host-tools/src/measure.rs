@@ -1,7 +1,8 @@
 //! How far two materials are apart: what `compare` prints and what an encoder verifies its goal by.
 //!
-//! Errors are of linear radiance and of `ln(x + e)`, where `e` is one thousandth of the reference's mean, the same for
-//! everything that is compared with that reference. Files are decoded by the core, at the directions of the reference.
+//! Errors are of linear radiance and of `ln(x + e)`, where `e` is one thousandth of the reference's mean, the
+//! same for everything that is compared with that reference. Files are decoded by the core, at the directions
+//! of the reference.
 
 use crate::baseline::decoder::{Decoder, Locator};
 use crate::dataset::{Dataset, Description, Statistics};
@@ -73,7 +74,8 @@ struct Sums {
     largest: Place,
 }
 
-/// Bytes of the images that all threads hold at once, and most pairs of a thread: runs of two kilobytes of a dataset, and enough parts to share.
+/// Bytes of the images that all threads hold at once, and most pairs of a thread: runs of two kilobytes of a
+/// dataset, and enough parts to share.
 const BUDGET: usize = 512 << 20;
 const MOST_PAIRS: usize = 256;
 /// Images of a baseline that are decoded together.
@@ -108,7 +110,8 @@ pub fn describe(file: &Selvedge<'_>) -> Description {
     }
 }
 
-/// The offset by which errors against a file are measured: one thousandth of its mean over lights at its first view.
+/// The offset by which errors against a file are measured: one thousandth of its mean over lights at its
+/// first view.
 pub fn log_offset(file: &Selvedge<'_>) -> f32 {
     let description = describe(file);
     let mut images_at = Vec::new();
@@ -116,7 +119,8 @@ pub fn log_offset(file: &Selvedge<'_>) -> f32 {
     let first_view: Vec<usize> = (0..description.lights.len()).collect();
     if images(Source::File(file, 0), &description, &first_view, &mut images_at).is_ok() {
         let count = images_at.len().max(1) as f64;
-        statistics.mean = std::array::from_fn(|c| images_at.iter().map(|rgb| rgb[c] as f64).sum::<f64>() / count);
+        statistics.mean =
+            std::array::from_fn(|c| images_at.iter().map(|rgb| rgb[c] as f64).sum::<f64>() / count);
     }
     statistics.log_offset()
 }
@@ -131,14 +135,24 @@ pub fn nearest(set: &[glam::DVec3], asked: Direction) -> usize {
 }
 
 /// The image of one pair of a reference's directions, row by row.
-pub fn image(source: Source<'_>, description: &Description, light: usize, view: usize) -> Result<Vec<[f32; 3]>> {
+pub fn image(
+    source: Source<'_>,
+    description: &Description,
+    light: usize,
+    view: usize,
+) -> Result<Vec<[f32; 3]>> {
     let mut out = Vec::new();
     images(source, description, &[view * description.lights.len() + light], &mut out)?;
     Ok(out)
 }
 
 /// Radiance of a source at some pairs, `view * lights + light`, ascending: `[pair][texel]`.
-fn images(source: Source<'_>, description: &Description, pairs: &[usize], out: &mut Vec<[f32; 3]>) -> Result<()> {
+fn images(
+    source: Source<'_>,
+    description: &Description,
+    pairs: &[usize],
+    out: &mut Vec<[f32; 3]>,
+) -> Result<()> {
     let (texels, lights) = (description.texels(), description.lights.len());
     out.resize(texels * pairs.len(), [0.0; 3]);
     let (Some(&first), Some(&last)) = (pairs.first(), pairs.last()) else { return Ok(()) };
@@ -156,17 +170,25 @@ fn images(source: Source<'_>, description: &Description, pairs: &[usize], out: &
             let mut scratch = vec![0; file.image_scratch_len()];
             let mut image = vec![Rgb::default(); texels];
             for (&pair, out) in pairs.iter().zip(out.chunks_mut(texels)) {
-                let [light, view] = [description.lights[pair % lights], description.views[pair / lights]].map(query);
-                file.decode_image(level, light, view, &mut scratch, &mut image).expect("the buffers are as long as asked for");
+                let [light, view] =
+                    [description.lights[pair % lights], description.views[pair / lights]].map(query);
+                file.decode_image(level, light, view, &mut scratch, &mut image)
+                    .expect("the buffers are as long as asked for");
                 out.iter_mut().zip(&image).for_each(|(out, rgb)| *out = rgb.to_f32());
             }
         }
         Source::Baseline(decoder, locator) => {
             let mut begun = 0;
             for same in pairs.chunk_by(|a, b| a / lights == b / lights) {
-                let blend = |pair: &usize| locator.light(query(description.lights[pair % lights]), decoder.two_nearest());
+                let blend = |pair: &usize| {
+                    locator.light(query(description.lights[pair % lights]), decoder.two_nearest())
+                };
                 let view = locator.view(query(description.views[same[0] / lights]), decoder.two_nearest());
-                decoder.images(&same.iter().map(blend).collect::<Vec<_>>(), view, &mut out[begun * texels..][..same.len() * texels]);
+                decoder.images(
+                    &same.iter().map(blend).collect::<Vec<_>>(),
+                    view,
+                    &mut out[begun * texels..][..same.len() * texels],
+                );
                 begun += same.len();
             }
         }
@@ -207,7 +229,13 @@ impl<'a> Images<'a> {
 }
 
 /// Sums of the differences of two images, and the largest value of the first.
-fn differences(reference: &[[f32; 3]], other: &[[f32; 3]], log_offset: f32, (light, view): (usize, usize), width: usize) -> (Sums, f32) {
+fn differences(
+    reference: &[[f32; 3]],
+    other: &[[f32; 3]],
+    log_offset: f32,
+    (light, view): (usize, usize),
+    width: usize,
+) -> (Sums, f32) {
     let mut sums = Sums::default();
     let mut peak = 0.0f32;
     for (texel, (a, b)) in reference.iter().zip(other).enumerate() {
@@ -221,14 +249,20 @@ fn differences(reference: &[[f32; 3]], other: &[[f32; 3]], log_offset: f32, (lig
             peak = peak.max(a);
             // The first of equal ones, and what is no number.
             if difference.abs() > sums.largest.difference || difference.is_nan() {
-                sums.largest = Place { difference: difference.abs(), texel: [texel % width, texel / width], light, view };
+                sums.largest = Place {
+                    difference: difference.abs(),
+                    texel: [texel % width, texel / width],
+                    light,
+                    view,
+                };
             }
         }
     }
     (sums, peak)
 }
 
-/// Compares a material with a reference, over all texels and pairs of `description`, which is that of the reference.
+/// Compares a material with a reference, over all texels and pairs of `description`, which is that of the
+/// reference.
 ///
 /// `peak` is that of the PSNR; the reference's largest value if `None`.
 ///
@@ -259,8 +293,12 @@ pub fn compare_every(
         let size = match source {
             Source::Data(dataset) => {
                 let own = dataset.description();
-                if (own.lights.len(), own.views.len()) != (description.lights.len(), description.views.len()) {
-                    return Err(ToolError::Different(format!("{}: other directions than those of the reference", dataset.path().display())));
+                if (own.lights.len(), own.views.len()) != (description.lights.len(), description.views.len())
+                {
+                    return Err(ToolError::Different(format!(
+                        "{}: other directions than those of the reference",
+                        dataset.path().display()
+                    )));
                 }
                 own.size
             }
@@ -274,9 +312,12 @@ pub fn compare_every(
     }
     let (texels, lights) = (description.texels(), description.lights.len());
     // The first on whose number leaves the same rest as the view's: every light has its turn.
-    let pairs: Vec<usize> = (0..description.pairs()).filter(|pair| pair % lights % every == pair / lights % every).collect();
-    let of_data = [reference, other].into_iter().filter(|source| matches!(source, Source::Data(_))).count().max(1);
-    let at_once = (BUDGET / (rayon::current_num_threads() * of_data * texels * size_of::<[f32; 3]>())).clamp(1, (MOST_PAIRS / every).max(1));
+    let pairs: Vec<usize> =
+        (0..description.pairs()).filter(|pair| pair % lights % every == pair / lights % every).collect();
+    let of_data =
+        [reference, other].into_iter().filter(|source| matches!(source, Source::Data(_))).count().max(1);
+    let at_once = (BUDGET / (rayon::current_num_threads() * of_data * texels * size_of::<[f32; 3]>()))
+        .clamp(1, (MOST_PAIRS / every).max(1));
     let groups: Vec<&[usize]> = pairs.chunks(at_once).collect();
     // Sums are those of single images, so that they do not depend on how many are held.
     let work = |group: usize| -> Result<Vec<(Sums, f32)>> {
@@ -284,27 +325,35 @@ pub fn compare_every(
         let (mut a, mut b) = (Images::new(reference), Images::new(other));
         let each = |i| {
             let place = (group[i] % lights, group[i] / lights);
-            Ok(differences(a.image(description, group, i)?, b.image(description, group, i)?, log_offset, place, description.size[0]))
+            Ok(differences(
+                a.image(description, group, i)?,
+                b.image(description, group, i)?,
+                log_offset,
+                place,
+                description.size[0],
+            ))
         };
         (0..group.len()).map(each).collect()
     };
-    let (sums, found_peak) = ordered(groups.len(), work, (Sums::default(), 0.0f32), |(total, peak), part, images| {
-        for (sums, image_peak) in images {
-            total.count += sums.count;
-            total.different += sums.different;
-            total.log += sums.log;
-            total.linear += sums.linear;
-            total.reference += sums.reference;
-            if sums.largest.difference > total.largest.difference || sums.largest.difference.is_nan() {
-                total.largest = sums.largest;
+    let (sums, found_peak) =
+        ordered(groups.len(), work, (Sums::default(), 0.0f32), |(total, peak), part, images| {
+            for (sums, image_peak) in images {
+                total.count += sums.count;
+                total.different += sums.different;
+                total.log += sums.log;
+                total.linear += sums.linear;
+                total.reference += sums.reference;
+                if sums.largest.difference > total.largest.difference || sums.largest.difference.is_nan() {
+                    total.largest = sums.largest;
+                }
+                *peak = peak.max(image_peak);
             }
-            *peak = peak.max(image_peak);
-        }
-        progress(part + 1, groups.len());
-    })?;
+            progress(part + 1, groups.len());
+        })?;
     let count = sums.count as f64;
     let peak = peak.unwrap_or(found_peak as f64);
-    let relative = if sums.reference > 0.0 { (sums.linear / sums.reference).sqrt() } else { sums.linear.sqrt() };
+    let relative =
+        if sums.reference > 0.0 { (sums.linear / sums.reference).sqrt() } else { sums.linear.sqrt() };
     Ok(Metrics {
         count: sums.count,
         different: sums.different,

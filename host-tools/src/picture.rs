@@ -24,7 +24,8 @@ fn to_srgb8(linear: f32) -> u8 {
 
 /// Black, blue, magenta, orange, white for 0 to 1: monotonic in lightness.
 pub fn false_colour(value: f32) -> [f32; 3] {
-    const STOPS: [[f32; 3]; 5] = [[0.0, 0.0, 0.02], [0.02, 0.04, 0.35], [0.45, 0.02, 0.35], [0.95, 0.4, 0.03], [1.0, 0.98, 0.85]];
+    const STOPS: [[f32; 3]; 5] =
+        [[0.0, 0.0, 0.02], [0.02, 0.04, 0.35], [0.45, 0.02, 0.35], [0.95, 0.4, 0.03], [1.0, 0.98, 0.85]];
     let at = value.clamp(0.0, 1.0) * 4.0;
     let low = (at as usize).min(3);
     let part = at - low as f32;
@@ -32,7 +33,13 @@ pub fn false_colour(value: f32) -> [f32; 3] {
 }
 
 /// The error of `ln(x + offset)` over the three colours in false colour; `white` is the error that is white.
-pub fn log_error(decoded: &[[f32; 3]], reference: &[[f32; 3]], [width, height]: [usize; 2], offset: f32, white: f32) -> Picture {
+pub fn log_error(
+    decoded: &[[f32; 3]],
+    reference: &[[f32; 3]],
+    [width, height]: [usize; 2],
+    offset: f32,
+    white: f32,
+) -> Picture {
     Picture::from_fn(width, height, |x, y| {
         let (a, b) = (decoded[y * width + x], reference[y * width + x]);
         let square: f32 = a.iter().zip(b).map(|(a, b)| ((a + offset).ln() - (b + offset).ln()).powi(2)).sum();
@@ -40,9 +47,16 @@ pub fn log_error(decoded: &[[f32; 3]], reference: &[[f32; 3]], [width, height]: 
     })
 }
 
-/// A decoded image, its reference and the error of `ln(x + offset)` in false colour, side by side; `white` is the error that
-/// is white.
-pub fn beside_error(decoded: &[[f32; 3]], reference: &[[f32; 3]], [width, height]: [usize; 2], offset: f32, white: f32, exposure: f32) -> Picture {
+/// A decoded image, its reference and the error of `ln(x + offset)` in false colour, side by side; `white` is
+/// the error that is white.
+pub fn beside_error(
+    decoded: &[[f32; 3]],
+    reference: &[[f32; 3]],
+    [width, height]: [usize; 2],
+    offset: f32,
+    white: f32,
+    exposure: f32,
+) -> Picture {
     let shown = |image: &[[f32; 3]]| Picture { width, height, pixels: image.to_vec() }.exposed(exposure);
     let error = log_error(decoded, reference, [width, height], offset, white);
     // Enlarged, so that a small tile can be looked at.
@@ -58,7 +72,9 @@ impl Picture {
 
     /// Every pixel as a square of `factor` pixels.
     pub fn enlarged(&self, factor: usize) -> Picture {
-        Picture::from_fn(self.width * factor, self.height * factor, |x, y| self.pixels[y / factor * self.width + x / factor])
+        Picture::from_fn(self.width * factor, self.height * factor, |x, y| {
+            self.pixels[y / factor * self.width + x / factor]
+        })
     }
 
     /// Times a factor.
@@ -76,7 +92,8 @@ impl Picture {
         for tile in tiles {
             for y in 0..tile.height {
                 let at = y * width + left;
-                all.pixels[at..at + tile.width].copy_from_slice(&tile.pixels[y * tile.width..(y + 1) * tile.width]);
+                all.pixels[at..at + tile.width]
+                    .copy_from_slice(&tile.pixels[y * tile.width..(y + 1) * tile.width]);
             }
             left += tile.width + gap;
         }

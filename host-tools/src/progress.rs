@@ -1,4 +1,5 @@
-//! How far a long piece of work is: one line on a terminal, nothing where stderr is none; and afterwards how long each step took.
+//! How far a long piece of work is: one line on a terminal, nothing where stderr is none; and afterwards how
+//! long each step took.
 
 use std::io::{IsTerminal as _, Write as _};
 use std::sync::Mutex;
@@ -54,7 +55,8 @@ impl Progress {
             return;
         }
         state.shown = Some(now);
-        let left = now.duration_since(state.begun).as_secs_f64() / done.max(1) as f64 * all.saturating_sub(done) as f64;
+        let left = now.duration_since(state.begun).as_secs_f64() / done.max(1) as f64
+            * all.saturating_sub(done) as f64;
         let _ = write!(std::io::stderr(), "\r\x1b[K{what}: {} %, {left:.0} s left", done * 100 / all.max(1));
     }
 
@@ -69,7 +71,12 @@ impl Progress {
     pub fn times(&self, rest: &str) -> String {
         let Ok(state) = self.state.lock() else { return String::new() };
         let last = (rest.to_owned(), state.told.elapsed().as_secs_f64());
-        let parts: Vec<String> = state.steps.iter().chain([&last]).map(|(what, seconds)| format!("{what} {seconds:.1} s")).collect();
+        let parts: Vec<String> = state
+            .steps
+            .iter()
+            .chain([&last])
+            .map(|(what, seconds)| format!("{what} {seconds:.1} s"))
+            .collect();
         parts.join(", ")
     }
 }

@@ -18,7 +18,10 @@ pub fn next_level(dataset: &Dataset, path: &Path) -> Result<Dataset> {
         let (x, y) = (texel % across * 2, texel / across * 2);
         let (mut sum, mut run, mut bytes) = (vec![0.0f32; length], vec![0.0f32; length], Vec::new());
         let mut count = 0.0;
-        for (x, y) in [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)].into_iter().filter(|&(x, y)| x < width && y < height) {
+        for (x, y) in [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)]
+            .into_iter()
+            .filter(|&(x, y)| x < width && y < height)
+        {
             dataset.read(y * width + x, 1, &mut bytes, &mut run)?;
             sum.iter_mut().zip(&run).for_each(|(sum, value)| *sum += value);
             count += 1.0;
@@ -50,7 +53,12 @@ mod tests {
     fn means_are_of_the_texels_that_are_there() {
         let folder = tempfile::tempdir().expect("a folder");
         let direction = vec![glam::DVec3::Z];
-        let description = Description { size: [3, 3], lights: direction.clone(), views: direction, ..Description::default() };
+        let description = Description {
+            size: [3, 3],
+            lights: direction.clone(),
+            views: direction,
+            ..Description::default()
+        };
         let writer = Writer::create(&folder.path().join("fine"), description).expect("created");
         (0..9).for_each(|i| writer.put(i, 0, &[i as f32, 1.0, 0.5]).expect("put"));
         writer.finish().expect("finished");

@@ -1,4 +1,5 @@
-//! Coefficients become integers: one table of atoms for all levels and layers, and their records (10.4, 10.5).
+//! Coefficients become integers: one table of atoms for all levels and layers, and their records (10.4,
+//! 10.5).
 //!
 //! An atom has one range of integers for all records that use it, and each record a shift that says what
 //! one integer is worth. Within a level and layer all records have the same shift. The shifts are either
@@ -45,11 +46,15 @@ fn unit(shift: u32) -> f64 {
 /// Every atom that a record names is in the table, at the place that 10.5-6 gives it, and no other.
 ///
 /// # Errors
-/// [`ToolError::Usage`] if `value_bits` has another shape than `records` or a number that is not 1 to 16, if a
-/// record names a dictionary that is not there or an atom twice, if a dictionary would have more than 65,536
-/// atoms, or if coefficients are too large for the format: 1,000 for one, or 2,046 for the sum of a record's
-/// magnitudes.
-pub fn quantise(records: &[Vec<Vec<FloatRecord>>], dictionaries: usize, value_bits: &[Vec<u32>]) -> Result<Quantised> {
+/// [`ToolError::Usage`] if `value_bits` has another shape than `records` or a number that is not 1 to 16, if
+/// a record names a dictionary that is not there or an atom twice, if a dictionary would have more than
+/// 65,536 atoms, or if coefficients are too large for the format: 1,000 for one, or 2,046 for the sum of a
+/// record's magnitudes.
+pub fn quantise(
+    records: &[Vec<Vec<FloatRecord>>],
+    dictionaries: usize,
+    value_bits: &[Vec<u32>],
+) -> Result<Quantised> {
     if !records.iter().map(Vec::len).eq(value_bits.iter().map(Vec::len)) {
         return Err(ToolError::Usage("every level and layer has a number of bits of a value".into()));
     }
@@ -78,13 +83,19 @@ pub fn quantise(records: &[Vec<Vec<FloatRecord>>], dictionaries: usize, value_bi
     let same = alone.iter().all(|&shift| shift == common);
     for mut shifts in [vec![common; groups.len()], alone].into_iter().take(if same { 1 } else { 2 }) {
         let fitted = loop {
-            match fit(&groups, &of_keys, total, &shifts).and_then(|atoms| Ok((quantise_groups(&groups, &atoms, &starts, &shifts)?, atoms))) {
+            match fit(&groups, &of_keys, total, &shifts)
+                .and_then(|atoms| Ok((quantise_groups(&groups, &atoms, &starts, &shifts)?, atoms)))
+            {
                 Ok(fitted) => break Some(fitted),
                 Err(group) if shifts[group] > *SHIFTS.start() => {
                     // With one shift for all they go down together.
                     let limit = shifts[group] - 1;
                     let all = shifts.iter().all(|&shift| shift == limit + 1);
-                    shifts.iter_mut().enumerate().filter(|(i, _)| all || *i == group).for_each(|(_, shift)| *shift = limit);
+                    shifts
+                        .iter_mut()
+                        .enumerate()
+                        .filter(|(i, _)| all || *i == group)
+                        .for_each(|(_, shift)| *shift = limit);
                 }
                 Err(_) => break None,
             }
@@ -100,7 +111,10 @@ pub fn quantise(records: &[Vec<Vec<FloatRecord>>], dictionaries: usize, value_bi
         return Err(ToolError::Usage("coefficients sum beyond the format".into()));
     };
     let atoms = starts.windows(2).map(|of_k| atoms[of_k[0]..of_k[1]].to_vec()).collect();
-    let mut filled = records_of.into_iter().zip(&groups).map(|(records, group)| CoefficientsModel { value_bits: group.value_bits, records });
+    let mut filled = records_of
+        .into_iter()
+        .zip(&groups)
+        .map(|(records, group)| CoefficientsModel { value_bits: group.value_bits, records });
     Ok((atoms, records.iter().map(|level| filled.by_ref().take(level.len()).collect()).collect()))
 }
 
@@ -109,12 +123,22 @@ pub fn quantise(records: &[Vec<Vec<FloatRecord>>], dictionaries: usize, value_bi
 /// # Errors
 /// [`ToolError::Usage`] if they are beyond the format.
 pub fn quantise_means(means_q20: &[f64]) -> Result<PairTableModel> {
-    let (low, high) = means_q20.iter().fold((f64::MAX, f64::MIN), |(low, high), &q| (low.min(q), high.max(q)));
+    let (low, high) =
+        means_q20.iter().fold((f64::MAX, f64::MIN), |(low, high), &q| (low.min(q), high.max(q)));
     let base = ((low + high) / 2.0).round().clamp(-BASE_BOUND as f64, BASE_BOUND as f64);
-    let Some(shift) = (0..=MEAN_SHIFT_LIMIT).find(|&s| (high - base).max(base - low) / 2f64.powi(s as i32) < 32_767.5) else {
-        return Err(ToolError::Usage(format!("means from {:e} to {:e} are beyond the format", low / 1_048_576.0, high / 1_048_576.0)));
+    let Some(shift) =
+        (0..=MEAN_SHIFT_LIMIT).find(|&s| (high - base).max(base - low) / 2f64.powi(s as i32) < 32_767.5)
+    else {
+        return Err(ToolError::Usage(format!(
+            "means from {:e} to {:e} are beyond the format",
+            low / 1_048_576.0,
+            high / 1_048_576.0
+        )));
     };
-    let entries = means_q20.iter().map(|q| ((q - base) / 2f64.powi(shift as i32)).round().clamp(-32_767.0, 32_767.0) as i16).collect();
+    let entries = means_q20
+        .iter()
+        .map(|q| ((q - base) / 2f64.powi(shift as i32)).round().clamp(-32_767.0, 32_767.0) as i16)
+        .collect();
     Ok(PairTableModel { base_q20: base as i32, shift, entries })
 }
 
@@ -128,7 +152,11 @@ pub fn quantise_scales(scales: &[f64]) -> Result<PairTableModel> {
         return Err(ToolError::Usage(format!("a scale of {largest:e} is beyond the format")));
     };
     let unit = 32_768.0 / 2f64.powi(shift as i32);
-    Ok(PairTableModel { base_q20: 0, shift, entries: scales.iter().map(|s| (s * unit).round().clamp(-32_767.0, 32_767.0) as i16).collect() })
+    Ok(PairTableModel {
+        base_q20: 0,
+        shift,
+        entries: scales.iter().map(|s| (s * unit).round().clamp(-32_767.0, 32_767.0) as i16).collect(),
+    })
 }
 
 /// The words without shift of all atoms that occur, ascending, for each dictionary.
@@ -138,21 +166,33 @@ fn atom_keys(records: &[Vec<Vec<FloatRecord>>], dictionaries: usize) -> Result<V
         match keys.get_mut(*number) {
             Some(keys) => keys.extend(list.iter().map(|(atom, _)| atom.word() >> 4)),
             None if list.is_empty() => {}
-            None => return Err(ToolError::Usage(format!("a record names dictionary {number} of {dictionaries}"))),
+            None => {
+                return Err(ToolError::Usage(format!(
+                    "a record names dictionary {number} of {dictionaries}"
+                )));
+            }
         }
     }
     for keys in &mut keys {
         keys.sort_unstable();
         keys.dedup();
         if keys.len() > ATOM_LIMIT as usize {
-            return Err(ToolError::Usage(format!("a dictionary would have {} atoms; the format has room for {ATOM_LIMIT}", keys.len())));
+            return Err(ToolError::Usage(format!(
+                "a dictionary would have {} atoms; the format has room for {ATOM_LIMIT}",
+                keys.len()
+            )));
         }
     }
     Ok(keys)
 }
 
 impl<'a> Group<'a> {
-    fn new(records: &'a [FloatRecord], keys: &[Vec<u32>], starts: &[usize], value_bits: u32) -> Result<Group<'a>> {
+    fn new(
+        records: &'a [FloatRecord],
+        keys: &[Vec<u32>],
+        starts: &[usize],
+        value_bits: u32,
+    ) -> Result<Group<'a>> {
         let mut atoms = Vec::with_capacity(records.iter().map(|record| record.1.len()).sum());
         let (mut largest, mut largest_sum) = (0.0f64, 0.0f64);
         for (number, list) in records {
@@ -168,7 +208,10 @@ impl<'a> Group<'a> {
                 let mut sorted = atoms[first..].to_vec();
                 sorted.sort_unstable();
                 if let Some(pair) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
-                    return Err(ToolError::Usage(format!("a record has the atom {} of dictionary {number} twice", pair[0] as usize - starts[*number])));
+                    return Err(ToolError::Usage(format!(
+                        "a record has the atom {} of dictionary {number} twice",
+                        pair[0] as usize - starts[*number]
+                    )));
                 }
             }
             // A sum that is not a number would be lost in a maximum.
@@ -178,26 +221,45 @@ impl<'a> Group<'a> {
             }
         }
         let fits = |shift: u32| largest_sum * unit(shift) < 65_000.0 && largest * unit(shift) < LARGEST;
-        let finest = SHIFTS.rev().find(|&shift| fits(shift)).or((largest_sum < 2047.0 && largest < 1000.0).then_some(*SHIFTS.start()));
+        let finest = SHIFTS
+            .rev()
+            .find(|&shift| fits(shift))
+            .or((largest_sum < 2047.0 && largest < 1000.0).then_some(*SHIFTS.start()));
         match finest {
             Some(finest) => Ok(Group { records, atoms, value_bits, finest }),
-            None => Err(ToolError::Usage(format!("coefficients of up to {largest} that sum to {largest_sum} are beyond the format"))),
+            None => Err(ToolError::Usage(format!(
+                "coefficients of up to {largest} that sum to {largest_sum} are beyond the format"
+            ))),
         }
     }
 
     /// Each coefficient's atom and value.
     fn coefficients(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
-        self.atoms.iter().map(|&atom| atom as usize).zip(self.records.iter().flat_map(|record| &record.1).map(|(_, value)| *value))
+        self.atoms
+            .iter()
+            .map(|&atom| atom as usize)
+            .zip(self.records.iter().flat_map(|record| &record.1).map(|(_, value)| *value))
     }
 }
 
 /// The atom whose word without shift is `key`.
 fn atom_of(key: u32) -> AtomModel {
-    AtomModel { y: key >> 24, x: key >> 20 & 0xf, light: key >> 10 & 0x3ff, view: key & 0x3ff, ..AtomModel::default() }
+    AtomModel {
+        y: key >> 24,
+        x: key >> 20 & 0xf,
+        light: key >> 10 & 0x3ff,
+        view: key & 0x3ff,
+        ..AtomModel::default()
+    }
 }
 
 /// Atoms whose ranges hold all values at these shifts, or the group whose shift is too fine.
-fn fit(groups: &[Group<'_>], keys: &[u32], total: usize, shifts: &[u32]) -> std::result::Result<Vec<AtomModel>, usize> {
+fn fit(
+    groups: &[Group<'_>],
+    keys: &[u32],
+    total: usize,
+    shifts: &[u32],
+) -> std::result::Result<Vec<AtomModel>, usize> {
     let mut low = vec![f64::MAX; total];
     let mut high = vec![f64::MIN; total];
     // What the highest of `2^bits` values falls short of base plus step, so coarse values need a larger step.
@@ -244,11 +306,26 @@ fn fit(groups: &[Group<'_>], keys: &[u32], total: usize, shifts: &[u32]) -> std:
 }
 
 /// The records of every group, or the group that has one whose sum is too large (10.7-7).
-fn quantise_groups(groups: &[Group<'_>], atoms: &[AtomModel], starts: &[usize], shifts: &[u32]) -> std::result::Result<Vec<Vec<RecordModel>>, usize> {
-    groups.iter().zip(shifts).enumerate().map(|(g, (group, &shift))| quantise_group(group, atoms, starts, shift).ok_or(g)).collect()
+fn quantise_groups(
+    groups: &[Group<'_>],
+    atoms: &[AtomModel],
+    starts: &[usize],
+    shifts: &[u32],
+) -> std::result::Result<Vec<Vec<RecordModel>>, usize> {
+    groups
+        .iter()
+        .zip(shifts)
+        .enumerate()
+        .map(|(g, (group, &shift))| quantise_group(group, atoms, starts, shift).ok_or(g))
+        .collect()
 }
 
-fn quantise_group(group: &Group<'_>, atoms: &[AtomModel], starts: &[usize], shift: u32) -> Option<Vec<RecordModel>> {
+fn quantise_group(
+    group: &Group<'_>,
+    atoms: &[AtomModel],
+    starts: &[usize],
+    shift: u32,
+) -> Option<Vec<RecordModel>> {
     let unit = unit(shift);
     let levels = (1u32 << group.value_bits) as f64;
     let mut numbers = group.atoms.iter();
@@ -265,7 +342,11 @@ fn quantise_group(group: &Group<'_>, atoms: &[AtomModel], starts: &[usize], shif
             .map(|((_, value), &number)| {
                 let atom = atoms[number as usize];
                 let target = value * unit * 2f64.powi(atom.shift as i32);
-                let guess = if atom.step == 0 { 0.0 } else { (target - atom.base as f64) * levels / atom.step as f64 };
+                let guess = if atom.step == 0 {
+                    0.0
+                } else {
+                    (target - atom.base as f64) * levels / atom.step as f64
+                };
                 let quantised = guess.round().clamp(0.0, levels - 1.0) as u16;
                 let coefficient = dequantise(atom.quantiser(), quantised as u32, group.value_bits);
                 sum += coefficient.unsigned_abs().div_ceil(1 << atom.shift);

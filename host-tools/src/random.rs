@@ -14,9 +14,11 @@ impl Random {
         Random { state: seed ^ 0x5e1f_ed9e_0000_0000, given: Vec::new() }
     }
 
-    /// From any bytes: they are the first random numbers, four bytes each, so that whoever chooses them chooses what is made.
+    /// From any bytes: they are the first random numbers, four bytes each, so that whoever chooses them
+    /// chooses what is made.
     pub fn from_bytes(bytes: &[u8]) -> Random {
-        let given = bytes.rchunks(4).map(|word| word.iter().fold(0, |word, &byte| word << 8 | byte as u32)).collect();
+        let given =
+            bytes.rchunks(4).map(|word| word.iter().fold(0, |word, &byte| word << 8 | byte as u32)).collect();
         Random { given, ..Random::new(bytes.len() as u64) }
     }
 

@@ -6,14 +6,16 @@
 //! anew. Fields and the grid change no result. Triangles do: [`same_triangles`] tells.
 
 use crate::model::{
-    AtomModel, AtomShifts, ChannelModel, CoefficientsModel, DictionaryModel, EnsembleModel, FactorModel, ListsModel, MaterialModel, MetadataModel,
-    PairTableModel, RecordModel, TensorModel, TransferModel,
+    AtomModel, AtomShifts, ChannelModel, CoefficientsModel, DictionaryModel, EnsembleModel, FactorModel,
+    ListsModel, MaterialModel, MetadataModel, PairTableModel, RecordModel, TensorModel, TransferModel,
 };
 use crate::triangulate::triangulate;
 use selvedge::direction::{hull_start, point, triangles_start};
 use selvedge::directory::OPTIONAL;
 use selvedge::ensemble::{Record, coefficients_start, read_record};
-use selvedge::material::{CHANNEL_FULL, CHANNEL_MISSING, Channel, METHOD_SPARSE_TENSOR, TRANSFER_LINEAR, level_size};
+use selvedge::material::{
+    CHANNEL_FULL, CHANNEL_MISSING, Channel, METHOD_SPARSE_TENSOR, TRANSFER_LINEAR, level_size,
+};
 use selvedge::stream::{Ones, window};
 use selvedge::tensor::{LIST_END, light_entry, lists_start, next_coefficient, open_list};
 use selvedge::words::{Words, high_i16, low_i16, low_part, packed_i16, word};
@@ -37,7 +39,9 @@ pub fn model_of(opened: &Selvedge<'_>) -> MaterialModel {
     } else {
         TransferModel::Log2 { offset: f32::from_bits(header.transfer_parameter) }
     };
-    let bytes_of = |section: &selvedge::Section| words.file[section.offset as usize..][..section.length as usize].to_vec();
+    let bytes_of = |section: &selvedge::Section| {
+        words.file[section.offset as usize..][..section.length as usize].to_vec()
+    };
     MaterialModel {
         size: [header.width, header.height],
         level_count: header.level_count,
@@ -97,7 +101,11 @@ fn points(words: Words<'_>, start: u32) -> Vec<[i32; 2]> {
 /// Rows of packed numbers, each padded to a word.
 fn packed_rows(words: Words<'_>, table: u32, rows: u32, columns: u32) -> Vec<i16> {
     let row_words = columns.div_ceil(2);
-    (0..rows).flat_map(|row| (0..columns).map(move |column| packed_i16(words, table + row * row_words, column) as i16)).collect()
+    (0..rows)
+        .flat_map(|row| {
+            (0..columns).map(move |column| packed_i16(words, table + row * row_words, column) as i16)
+        })
+        .collect()
 }
 
 fn pair_table(opened: &Selvedge<'_>, start: u32) -> PairTableModel {
@@ -129,15 +137,21 @@ fn ensemble(opened: &Selvedge<'_>, channel: Channel) -> EnsembleModel {
         .map(|k| {
             let entry = channel.atoms_start + 2 + k * 2;
             let list = channel.atoms_start + word(words, entry + 1);
-            (0..word(words, entry)).map(|i| atom(word(words, list + i * 2), word(words, list + i * 2 + 1))).collect()
+            (0..word(words, entry))
+                .map(|i| atom(word(words, list + i * 2), word(words, list + i * 2 + 1)))
+                .collect()
         })
         .collect();
     let coefficients = (0..header.level_count)
         .map(|level| {
-            let blocks: u32 = [header.width, header.height].iter().map(|&size| level_size(size, level).div_ceil(header.edge)).product();
+            let blocks: u32 = [header.width, header.height]
+                .iter()
+                .map(|&size| level_size(size, level).div_ceil(header.edge))
+                .product();
             let of_layer = |layer: u32| {
                 let start = coefficients_start(words, material, channel, level, layer);
-                let records = (0..blocks).map(|block| record(words, read_record(words, start, block))).collect();
+                let records =
+                    (0..blocks).map(|block| record(words, read_record(words, start, block))).collect();
                 CoefficientsModel { value_bits: word(words, start) & 0xff, records }
             };
             (0..header.layer_count).map(of_layer).collect()
@@ -157,7 +171,8 @@ fn tensor(opened: &Selvedge<'_>) -> TensorModel {
         let entry = word(words, material.light_atoms_start + 2 + n);
         [0, 1, 2].map(|c| light_entry(entry, c) as i16)
     };
-    let (count, entries) = (word(words, material.fibres_start), word(words, material.fibres_start + 1) & 0xff);
+    let (count, entries) =
+        (word(words, material.fibres_start), word(words, material.fibres_start + 1) & 0xff);
     let shifts = |n: u32| {
         let shifts = word(words, material.fibres_start + 2 + n);
         AtomShifts { angular: shifts & 31, gain: shifts >> 5 & 31 }
@@ -178,7 +193,9 @@ fn tensor(opened: &Selvedge<'_>) -> TensorModel {
         lights: (0..header.light_count * light_atoms).map(light).collect(),
         entries,
         atoms: (0..count).map(shifts).collect(),
-        fibres: (0..header.view_count * count * entries).map(|n| packed_i16(words, material.fibres_start + 2 + count, n) as u16).collect(),
+        fibres: (0..header.view_count * count * entries)
+            .map(|n| packed_i16(words, material.fibres_start + 2 + count, n) as u16)
+            .collect(),
         lists: (0..header.level_count).map(of_level).collect(),
     }
 }
@@ -218,7 +235,8 @@ fn record(words: Words<'_>, record: Record) -> RecordModel {
     RecordModel { dictionary: record.dictionary, shift: record.shift, coefficients }
 }
 
-/// Where the tables of a channel's dictionary are: first word and words of a row (10.1-3, 10.2-1); and its atoms.
+/// Where the tables of a channel's dictionary are: first word and words of a row (10.1-3, 10.2-1); and its
+/// atoms.
 pub(crate) struct RecordTables {
     pub light: (u32, u32),
     pub view: (u32, u32),
@@ -254,6 +272,9 @@ pub(crate) fn record_coefficients(words: Words<'_>, record: Record, mut each: im
         let Some(place) = ones.take() else { return };
         let high = place - record.highs_bit - index;
         let field = window(bytes, record.fields_bit + index * field_bits) as u32;
-        each(high << record.low_bits | low_part(field, record.low_bits), low_part(field >> record.low_bits, record.value_bits));
+        each(
+            high << record.low_bits | low_part(field, record.low_bits),
+            low_part(field >> record.low_bits, record.value_bits),
+        );
     }
 }

@@ -44,7 +44,10 @@ impl Sector {
     /// Refuses angles that are none.
     pub(crate) fn check(&self) -> Result<()> {
         if !(0.0..=90.0).contains(&self.polar_max) {
-            return Err(ToolError::Usage(format!("the largest angle from the normal is 0 to 90 degrees, not {}", self.polar_max)));
+            return Err(ToolError::Usage(format!(
+                "the largest angle from the normal is 0 to 90 degrees, not {}",
+                self.polar_max
+            )));
         }
         if self.azimuth.is_some_and(|azimuth| azimuth.iter().any(|angle| !angle.is_finite())) {
             return Err(ToolError::Usage("azimuths are numbers of degrees".into()));
@@ -72,7 +75,8 @@ impl Sector {
             return false;
         }
         let azimuth = y.atan2(x).to_degrees();
-        (x == 0.0 && y == 0.0) || self.range().is_none_or(|[from, width]| (azimuth - from).rem_euclid(360.0) <= width)
+        (x == 0.0 && y == 0.0)
+            || self.range().is_none_or(|[from, width]| (azimuth - from).rem_euclid(360.0) <= width)
     }
 
     /// Convex pieces as half-planes, widened by the margin; the disc is left to [`touches`].
@@ -88,7 +92,11 @@ impl Sector {
                 let [first, last] = [i, i + 1].map(|i| from + width * i as f64 / count as f64);
                 let ([ax, ay], [bx, by]) = (ray(first), ray(last));
                 // Left of the first ray, right of the last, and not on their other sides.
-                vec![HalfPlane::new([-ay, ax], [0.0; 2]), HalfPlane::new([by, -bx], [0.0; 2]), HalfPlane::new(ray((first + last) / 2.0), [0.0; 2])]
+                vec![
+                    HalfPlane::new([-ay, ax], [0.0; 2]),
+                    HalfPlane::new([by, -bx], [0.0; 2]),
+                    HalfPlane::new(ray((first + last) / 2.0), [0.0; 2]),
+                ]
             })
             .collect()
     }
@@ -170,17 +178,28 @@ fn needed(points: &[[i32; 2]], t: &Triangulation, sector: &Sector) -> Needed {
     let edge_is = |i: usize| {
         let (a, b) = (hull_at(i), hull_at(i + 1));
         let along = [b[0] - a[0], b[1] - a[1]];
-        is_touched(&[HalfPlane::new(along, a), HalfPlane::new(along.map(|c| -c), b), HalfPlane::new([along[1], -along[0]], a)])
+        is_touched(&[
+            HalfPlane::new(along, a),
+            HalfPlane::new(along.map(|c| -c), b),
+            HalfPlane::new([along[1], -along[0]], a),
+        ])
     };
     let corner_is = |i: usize| {
         let (o, a, b) = (hull_at(i + t.hull.len() - 1), hull_at(i), hull_at(i + 1));
-        is_touched(&[HalfPlane::new([a[0] - b[0], a[1] - b[1]], a), HalfPlane::new([a[0] - o[0], a[1] - o[1]], a)])
+        is_touched(&[
+            HalfPlane::new([a[0] - b[0], a[1] - b[1]], a),
+            HalfPlane::new([a[0] - o[0], a[1] - o[1]], a),
+        ])
     };
     let places = 0..t.hull.len();
     Needed {
         triangles: t.triangles.iter().filter(|corners| triangle_is(corners)).copied().collect(),
         edges: places.clone().filter(|&i| edge_is(i)).collect(),
-        corners: if t.hull.is_empty() { vec![0] } else { places.filter(|&i| corner_is(i)).map(|i| t.hull[i]).collect() },
+        corners: if t.hull.is_empty() {
+            vec![0]
+        } else {
+            places.filter(|&i| corner_is(i)).map(|i| t.hull[i]).collect()
+        },
     }
 }
 
@@ -211,10 +230,14 @@ fn keeps_all(points: &[[i32; 2]], whole: &Triangulation, needed: &Needed, kept: 
     let ends = |hull: &[u32], i: usize| [hull[i % hull.len()], hull[(i + 1) % hull.len()]];
     let place_of = |edge: usize| (0..hull.len()).position(|i| ends(&hull, i) == ends(&whole.hull, edge));
     let places: Vec<Option<usize>> = needed.edges.iter().map(|&edge| place_of(edge)).collect();
-    // Two edges in one line meet in a point whose perpendicular is of both: the first one answers, in both sets.
+    // Two edges in one line meet in a point whose perpendicular is of both: the first one answers, in both
+    // sets.
     let same_order = (0..places.len()).all(|i| {
         let next = (0..places.len()).find(|&j| needed.edges[j] == (needed.edges[i] + 1) % whole.hull.len());
-        next.is_none_or(|j| !is_straight(points, whole, needed.edges[i]) || (needed.edges[i] < needed.edges[j]) == (places[i] < places[j]))
+        next.is_none_or(|j| {
+            !is_straight(points, whole, needed.edges[i])
+                || (needed.edges[i] < needed.edges[j]) == (places[i] < places[j])
+        })
     });
     needed.triangles.iter().all(|corners| triangles.binary_search(corners).is_ok())
         && places.iter().all(Option::is_some)

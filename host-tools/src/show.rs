@@ -6,7 +6,12 @@ use selvedge::batch::FilteredQuery;
 use selvedge::{Direction, Rgb, Selvedge};
 
 /// A ball of the material under a distant light: orthographic, the texture laid on from the front.
-pub fn render_ball(material: &Selvedge<'_>, size: usize, light: glam::DVec3, exposure: f32) -> Result<Picture> {
+pub fn render_ball(
+    material: &Selvedge<'_>,
+    size: usize,
+    light: glam::DVec3,
+    exposure: f32,
+) -> Result<Picture> {
     const OVERSAMPLING: usize = 2;
     const BACKGROUND: f32 = 0.12;
     let wide = size * OVERSAMPLING;
@@ -18,7 +23,8 @@ pub fn render_ball(material: &Selvedge<'_>, size: usize, light: glam::DVec3, exp
             let [px, py] = [x, y].map(|c| (c as f64 + 0.5) / wide as f64 * 2.1 - 1.05);
             let square = px * px + py * py;
             if square >= 1.0 {
-                background[y / OVERSAMPLING * size + x / OVERSAMPLING] += BACKGROUND / (OVERSAMPLING * OVERSAMPLING) as f32;
+                background[y / OVERSAMPLING * size + x / OVERSAMPLING] +=
+                    BACKGROUND / (OVERSAMPLING * OVERSAMPLING) as f32;
                 continue;
             }
             let normal = glam::DVec3::new(px, -py, (1.0 - square).sqrt());
@@ -30,13 +36,20 @@ pub fn render_ball(material: &Selvedge<'_>, size: usize, light: glam::DVec3, exp
             };
             let fraction = |turns: f64| (turns.rem_euclid(1.0) * 4_294_967_296.0) as u32;
             let (u, v) = (normal.x.asin() * 1.6, normal.y.asin() * 1.6);
-            queries.push(FilteredQuery { u_q32: fraction(u), v_q32: fraction(v), light: local(light), view: local(glam::DVec3::Z) });
+            queries.push(FilteredQuery {
+                u_q32: fraction(u),
+                v_q32: fraction(v),
+                light: local(light),
+                view: local(glam::DVec3::Z),
+            });
             places.push(y / OVERSAMPLING * size + x / OVERSAMPLING);
         }
     }
     let mut out = vec![Rgb::default(); queries.len()];
     let mut scratch = vec![0; material.batch_scratch_len(queries.len())];
-    material.sample_batch(&queries, &mut scratch, &mut out).map_err(|error| ToolError::Mismatch(error.to_string()))?;
+    material
+        .sample_batch(&queries, &mut scratch, &mut out)
+        .map_err(|error| ToolError::Mismatch(error.to_string()))?;
     let weight = exposure / (OVERSAMPLING * OVERSAMPLING) as f32;
     let mut picture = Picture::from_fn(size, size, |x, y| [background[y * size + x]; 3]);
     for (place, rgb) in places.into_iter().zip(out) {
@@ -48,10 +61,17 @@ pub fn render_ball(material: &Selvedge<'_>, size: usize, light: glam::DVec3, exp
 }
 
 /// An image of the whole material at one pair of directions.
-pub fn decode_picture(material: &Selvedge<'_>, level: u32, light: Direction, view: Direction) -> Result<Picture> {
+pub fn decode_picture(
+    material: &Selvedge<'_>,
+    level: u32,
+    light: Direction,
+    view: Direction,
+) -> Result<Picture> {
     let [width, height] = material.image_size(level).map(|s| s as usize);
     let mut out = vec![Rgb::default(); width * height];
     let mut scratch = vec![0; material.image_scratch_len()];
-    material.decode_image(level, light, view, &mut scratch, &mut out).map_err(|error| ToolError::Mismatch(error.to_string()))?;
+    material
+        .decode_image(level, light, view, &mut scratch, &mut out)
+        .map_err(|error| ToolError::Mismatch(error.to_string()))?;
     Ok(Picture { width, height, pixels: out.into_iter().map(Rgb::to_f32).collect() })
 }

@@ -1,8 +1,8 @@
-//! How alike two pictures look: SSIM (Wang, Bovik, Sheikh, Simoncelli 2004) and FLIP (Andersson, Nilsson, Akenine-Moeller, Oskarsson,
-//! Aastrom, Fairchild 2020).
+//! How alike two pictures look: SSIM (Wang, Bovik, Sheikh, Simoncelli 2004) and FLIP (Andersson, Nilsson,
+//! Akenine-Moeller, Oskarsson, Aastrom, Fairchild 2020).
 //!
-//! Both are of pictures as they are shown: linear RGB between zero and one, which a caller has exposed. Pixels beyond the
-//! border are those of the border.
+//! Both are of pictures as they are shown: linear RGB between zero and one, which a caller has exposed.
+//! Pixels beyond the border are those of the border.
 
 use std::f32::consts::PI;
 
@@ -35,11 +35,17 @@ impl Plane {
 
     /// Rows by one kernel, columns by another, both of odd length.
     fn filtered(&self, along_x: &[f32], along_y: &[f32]) -> Plane {
-        let tap = |at: usize, k: usize, kernel: &[f32], size: usize| (at + k).saturating_sub(kernel.len() / 2).min(size - 1);
+        let tap = |at: usize, k: usize, kernel: &[f32], size: usize| {
+            (at + k).saturating_sub(kernel.len() / 2).min(size - 1)
+        };
         let mut rows = vec![0.0; self.values.len()];
         for (i, out) in rows.iter_mut().enumerate() {
             let (x, row) = (i % self.width, &self.values[i / self.width * self.width..][..self.width]);
-            *out = along_x.iter().enumerate().map(|(k, weight)| weight * row[tap(x, k, along_x, self.width)]).sum();
+            *out = along_x
+                .iter()
+                .enumerate()
+                .map(|(k, weight)| weight * row[tap(x, k, along_x, self.width)])
+                .sum();
         }
         let mut values = vec![0.0f32; rows.len()];
         for (y, out) in values.chunks_mut(self.width).enumerate() {
@@ -59,7 +65,8 @@ fn gaussian(deviation: f32, radius: usize) -> Vec<f32> {
     (0..=2 * radius).map(|k| at(k) / sum).collect()
 }
 
-/// Mean structural similarity of the sRGB-encoded luma (Rec. 709), windows of 11 x 11 with a deviation of 1.5; one for equal pictures.
+/// Mean structural similarity of the sRGB-encoded luma (Rec. 709), windows of 11 x 11 with a deviation of
+/// 1.5; one for equal pictures.
 pub fn ssim(reference: &[Rgb], other: &[Rgb], width: usize) -> f64 {
     let luma = |[r, g, b]: Rgb| 0.2126 * encoded(r) + 0.7152 * encoded(g) + 0.0722 * encoded(b);
     let (a, b) = (Plane::of(reference, width, luma), Plane::of(other, width, luma));
@@ -77,9 +84,17 @@ pub fn ssim(reference: &[Rgb], other: &[Rgb], width: usize) -> f64 {
 }
 
 /// Linear RGB (Rec. 709) to XYZ.
-const TO_XYZ: [Rgb; 3] = [[0.412_390_8, 0.357_584_33, 0.180_480_8], [0.212_639, 0.715_168_65, 0.072_192_32], [0.019_330_82, 0.119_194_78, 0.950_532_14]];
+const TO_XYZ: [Rgb; 3] = [
+    [0.412_390_8, 0.357_584_33, 0.180_480_8],
+    [0.212_639, 0.715_168_65, 0.072_192_32],
+    [0.019_330_82, 0.119_194_78, 0.950_532_14],
+];
 /// XYZ to linear RGB.
-const FROM_XYZ: [Rgb; 3] = [[3.240_97, -1.537_383_2, -0.498_610_8], [-0.969_243_65, 1.875_967_5, 0.041_555_06], [0.055_630_08, -0.203_976_96, 1.056_971_5]];
+const FROM_XYZ: [Rgb; 3] = [
+    [3.240_97, -1.537_383_2, -0.498_610_8],
+    [-0.969_243_65, 1.875_967_5, 0.041_555_06],
+    [0.055_630_08, -0.203_976_96, 1.056_971_5],
+];
 
 fn times(m: &[Rgb; 3], v: Rgb) -> Rgb {
     m.each_ref().map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
@@ -115,21 +130,25 @@ fn hyab(a: Rgb, b: Rgb) -> f32 {
     (a[0] - b[0]).abs() + (a[1] - b[1]).hypot(a[2] - b[2])
 }
 
-/// The colours that an observer makes out: an image filtered by the contrast sensitivity of its three opponent channels.
+/// The colours that an observer makes out: an image filtered by the contrast sensitivity of its three
+/// opponent channels.
 fn seen(image: &[Rgb], width: usize) -> Vec<Rgb> {
     // Sums of Gaussians in the frequency domain, as amplitude and falloff (table 1 of the paper).
-    const SENSITIVITY: [[[f32; 2]; 2]; 3] = [[[1.0, 0.0047], [0.0, 1e-5]], [[1.0, 0.0053], [0.0, 1e-5]], [[34.1, 0.04], [13.5, 0.025]]];
+    const SENSITIVITY: [[[f32; 2]; 2]; 3] =
+        [[[1.0, 0.0047], [0.0, 1e-5]], [[1.0, 0.0053], [0.0, 1e-5]], [[34.1, 0.04], [13.5, 0.025]]];
     let step = 1.0 / PIXELS_PER_DEGREE;
     let radius = (3.0 * (0.04 / (2.0 * PI * PI)).sqrt() * PIXELS_PER_DEGREE).ceil() as usize;
     let channels: [Plane; 3] = std::array::from_fn(|c| {
         let plane = Plane::of(image, width, |rgb| to_opponent(rgb)[c]);
-        // A Gaussian with a frequency falloff b is one of the place with pi^2 / b, which is a product of one along x and one along y.
+        // A Gaussian with a frequency falloff b is one of the place with pi^2 / b, which is a product of one
+        // along x and one along y.
         let parts = SENSITIVITY[c].map(|[amplitude, falloff]| {
             let at = |k: usize| (-PI * PI / falloff * ((k as f32 - radius as f32) * step).powi(2)).exp();
             let kernel: Vec<f32> = (0..=2 * radius).map(at).collect();
             (amplitude * PI / falloff, kernel)
         });
-        let total: f32 = parts.iter().map(|(amplitude, kernel)| amplitude * kernel.iter().sum::<f32>().powi(2)).sum();
+        let total: f32 =
+            parts.iter().map(|(amplitude, kernel)| amplitude * kernel.iter().sum::<f32>().powi(2)).sum();
         let mut out = Plane { values: vec![0.0; plane.values.len()], ..plane };
         for (amplitude, kernel) in parts.iter().filter(|part| part.0 > 0.0) {
             let filtered = plane.filtered(kernel, kernel);
@@ -137,7 +156,8 @@ fn seen(image: &[Rgb], width: usize) -> Vec<Rgb> {
         }
         out
     });
-    let clamped = |i: usize| from_opponent([0, 1, 2].map(|c: usize| channels[c].values[i])).map(|v| v.clamp(0.0, 1.0));
+    let clamped =
+        |i: usize| from_opponent([0, 1, 2].map(|c: usize| channels[c].values[i])).map(|v| v.clamp(0.0, 1.0));
     (0..image.len()).map(clamped).collect()
 }
 
@@ -146,7 +166,9 @@ fn features(image: &[Rgb], width: usize) -> [Plane; 2] {
     let lightness = Plane::of(image, width, |rgb| (to_opponent(rgb)[0] + 16.0) / 116.0);
     let deviation = 0.5 * 0.082 * PIXELS_PER_DEGREE;
     let radius = (3.0 * deviation).ceil() as usize;
-    let blur: Vec<f32> = (0..=2 * radius).map(|k| (-((k as f32 - radius as f32).powi(2)) / (2.0 * deviation * deviation)).exp()).collect();
+    let blur: Vec<f32> = (0..=2 * radius)
+        .map(|k| (-((k as f32 - radius as f32).powi(2)) / (2.0 * deviation * deviation)).exp())
+        .collect();
     // Positive weights sum to one, negative ones to minus one.
     let balanced = |mut kernel: Vec<f32>, blur: &[f32]| {
         let across: f32 = blur.iter().sum();
@@ -157,7 +179,10 @@ fn features(image: &[Rgb], width: usize) -> [Plane; 2] {
     };
     let at = |k: usize| k as f32 - radius as f32;
     let edge = balanced(blur.iter().enumerate().map(|(k, w)| -at(k) * w).collect(), &blur);
-    let point = balanced(blur.iter().enumerate().map(|(k, w)| (at(k).powi(2) / (deviation * deviation) - 1.0) * w).collect(), &blur);
+    let point = balanced(
+        blur.iter().enumerate().map(|(k, w)| (at(k).powi(2) / (deviation * deviation) - 1.0) * w).collect(),
+        &blur,
+    );
     [edge, point].map(|kernel| {
         let (x, y) = (lightness.filtered(&kernel, &blur), lightness.filtered(&blur, &kernel));
         x.map2(&y, f32::hypot)
@@ -176,9 +201,14 @@ pub fn flip(reference: &[Rgb], other: &[Rgb], width: usize) -> f64 {
     let ([edges_a, points_a], [edges_b, points_b]) = (features(&reference, width), features(&other, width));
     let at = |i: usize| {
         let distance = hyab(hunt_lab(seen_a[i]), hunt_lab(seen_b[i])).powf(EXPONENT);
-        let colour = if distance < bend_at { distance * bend_to / bend_at } else { bend_to + (distance - bend_at) / (largest - bend_at) * (1.0 - bend_to) };
+        let colour = if distance < bend_at {
+            distance * bend_to / bend_at
+        } else {
+            bend_to + (distance - bend_at) / (largest - bend_at) * (1.0 - bend_to)
+        };
         let difference = |a: &Plane, b: &Plane| (a.values[i] - b.values[i]).abs();
-        let feature = (difference(&edges_a, &edges_b).max(difference(&points_a, &points_b)) / 2f32.sqrt()).sqrt();
+        let feature =
+            (difference(&edges_a, &edges_b).max(difference(&points_a, &points_b)) / 2f32.sqrt()).sqrt();
         (colour.powf(1.0 - feature)) as f64
     };
     (0..reference.len()).map(at).sum::<f64>() / reference.len() as f64
@@ -191,7 +221,13 @@ mod tests {
 
     fn noise(seed: u64, amount: f32) -> Vec<Rgb> {
         let (mut base, mut random) = (Random::new(1), Random::new(seed));
-        (0..32 * 24).map(|_| std::array::from_fn(|_| base.range(200, 800) as f32 / 1000.0 + amount * random.range(-100, 100) as f32 / 1000.0)).collect()
+        (0..32 * 24)
+            .map(|_| {
+                std::array::from_fn(|_| {
+                    base.range(200, 800) as f32 / 1000.0 + amount * random.range(-100, 100) as f32 / 1000.0
+                })
+            })
+            .collect()
     }
 
     #[test]
@@ -199,7 +235,10 @@ mod tests {
         let clean = noise(2, 0.0);
         assert!((ssim(&clean, &clean, 32) - 1.0).abs() < 1e-9);
         assert_eq!(flip(&clean, &clean, 32), 0.0);
-        let worse: Vec<(f64, f64)> = [0.2, 0.5, 1.0].iter().map(|&amount| (ssim(&clean, &noise(3, amount), 32), flip(&clean, &noise(3, amount), 32))).collect();
+        let worse: Vec<(f64, f64)> = [0.2, 0.5, 1.0]
+            .iter()
+            .map(|&amount| (ssim(&clean, &noise(3, amount), 32), flip(&clean, &noise(3, amount), 32)))
+            .collect();
         assert!(worse.windows(2).all(|pair| pair[1].0 < pair[0].0 && pair[1].1 > pair[0].1), "{worse:?}");
     }
 
@@ -215,7 +254,11 @@ mod tests {
         let largest = hyab(hunt_lab([0.0, 1.0, 0.0]), hunt_lab([0.0, 0.0, 1.0])).powf(0.7);
         let distance = 100f32.powf(0.7);
         let colour = 0.95 + (distance - 0.4 * largest) / (0.6 * largest) * 0.05;
-        assert!((flip(&black, &white, 12) - colour as f64).abs() < 2e-3, "{} {colour}", flip(&black, &white, 12));
+        assert!(
+            (flip(&black, &white, 12) - colour as f64).abs() < 2e-3,
+            "{} {colour}",
+            flip(&black, &white, 12)
+        );
     }
 
     #[test]

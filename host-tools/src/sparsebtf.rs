@@ -6,7 +6,10 @@
 //! whose partners have theirs becomes a mean alone, from the shared mean of all three (their average).
 
 use crate::error::{Result, ToolError};
-use crate::model::{AtomModel, ChannelModel, DictionaryModel, EnsembleModel, FactorModel, MaterialModel, MetadataModel, PairTableModel, TransferModel};
+use crate::model::{
+    AtomModel, ChannelModel, DictionaryModel, EnsembleModel, FactorModel, MaterialModel, MetadataModel,
+    PairTableModel, TransferModel,
+};
 use crate::quantise::{FloatRecord, quantise, quantise_means, quantise_scales};
 use crate::triangulate::project;
 use std::collections::BTreeMap;
@@ -96,7 +99,10 @@ pub fn materials_in(folder: &Path) -> Result<Vec<String>> {
         .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
         .filter_map(|name| {
             let name = name.strip_prefix("Coeffs_BTF_")?;
-            ["Y", "U", "V"].iter().find_map(|letter| name.strip_suffix(&format!("_1e-05_{letter}.bin"))).map(str::to_owned)
+            ["Y", "U", "V"]
+                .iter()
+                .find_map(|letter| name.strip_suffix(&format!("_1e-05_{letter}.bin")))
+                .map(str::to_owned)
         })
         .collect();
     names.sort();
@@ -110,10 +116,14 @@ pub fn read_material(folder: &Path, name: &str, blocks: Option<[usize; 2]>) -> R
     let xyz = locations.doubles();
     let count = xyz.len() / 4;
     if count == 0 || locations.bytes.len() != count * 32 || count > 1024 {
-        return locations.fail(0, format!("{} bytes are not x, y, z and id of 1 to 1,024 directions", locations.bytes.len()));
+        return locations.fail(
+            0,
+            format!("{} bytes are not x, y, z and id of 1 to 1,024 directions", locations.bytes.len()),
+        );
     }
     locations.finite(&xyz, 8)?;
-    let directions: Vec<glam::DVec3> = (0..count).map(|i| glam::DVec3::new(xyz[i], xyz[count + i], xyz[2 * count + i])).collect();
+    let directions: Vec<glam::DVec3> =
+        (0..count).map(|i| glam::DVec3::new(xyz[i], xyz[count + i], xyz[2 * count + i])).collect();
     if let Some(i) = directions.iter().position(|d| (d.length() - 1.0).abs() > 1e-3 || d.z < 0.0) {
         return locations.fail(i * 8, "a direction is not a unit vector of the upper hemisphere");
     }
@@ -121,7 +131,10 @@ pub fn read_material(folder: &Path, name: &str, blocks: Option<[usize; 2]>) -> R
     let statistics = Foreign::read(folder.join(format!("{name}_mean_std.bin")))?;
     let numbers = statistics.doubles();
     if statistics.bytes.len() != count * count * 16 {
-        return statistics.fail(0, format!("{} bytes are not mean and deviation of {count} x {count} pairs", statistics.bytes.len()));
+        return statistics.fail(
+            0,
+            format!("{} bytes are not mean and deviation of {count} x {count} pairs", statistics.bytes.len()),
+        );
     }
     statistics.finite(&numbers, 8)?;
     let mut material = AuthorsMaterial {
@@ -153,9 +166,17 @@ pub fn read_material(folder: &Path, name: &str, blocks: Option<[usize; 2]>) -> R
     }
 }
 
-fn read_channel(file: &Foreign, dictionary: &Foreign, rows: [usize; 4], shape: Option<[usize; 2]>) -> Result<(AuthorsChannel, [usize; 2])> {
+fn read_channel(
+    file: &Foreign,
+    dictionary: &Foreign,
+    rows: [usize; 4],
+    shape: Option<[usize; 2]>,
+) -> Result<(AuthorsChannel, [usize; 2])> {
     let words: Vec<u16> = file.bytes.as_chunks::<2>().0.iter().map(|&b| u16::from_le_bytes(b)).collect();
-    if file.bytes.len() % 2 != 0 || words.len() < 4 || words[..4].iter().zip(rows).any(|(&w, r)| w as usize != r) {
+    if file.bytes.len() % 2 != 0
+        || words.len() < 4
+        || words[..4].iter().zip(rows).any(|(&w, r)| w as usize != r)
+    {
         return file.fail(0, format!("the sizes {:?} are not {rows:?}", words.get(..4)));
     }
     // 4 + 5 N + 2 P words, where N is the sum of the P counts: the number of blocks must explain the length.
@@ -173,7 +194,8 @@ fn read_channel(file: &Foreign, dictionary: &Foreign, rows: [usize; 4], shape: O
     if let Some(i) = columns.iter().position(|l| l.iter().zip(rows).any(|(&l, r)| l as usize >= r)) {
         return file.fail(8 + i * 8, format!("the columns {:?} are not there", columns[i]));
     }
-    let values: Vec<f64> = words[4 + 4 * n + 2 * blocks..].iter().map(|&w| half::f16::from_bits(w).to_f64()).collect();
+    let values: Vec<f64> =
+        words[4 + 4 * n + 2 * blocks..].iter().map(|&w| half::f16::from_bits(w).to_f64()).collect();
     file.finite(&values, 2)?;
     let scalars = 2 * (rows[0] * rows[0] + rows[2] * rows[2]);
     let factors = dictionary.halves();
@@ -192,7 +214,9 @@ fn read_channel(file: &Foreign, dictionary: &Foreign, rows: [usize; 4], shape: O
         let mode_factors = &factors[at..at + count * m * m];
         at += count * m * m;
         // Columns are contiguous in the file; rows are here.
-        (0..count * m * m).map(|i| mode_factors[i / (m * m) * m * m + i % m * m + i / m % m]).collect::<Vec<f64>>()
+        (0..count * m * m)
+            .map(|i| mode_factors[i / (m * m) * m * m + i % m * m + i / m % m])
+            .collect::<Vec<f64>>()
     });
     let counts = words[4 + 4 * n + blocks..4 + 4 * n + 2 * blocks].to_vec();
     Ok((AuthorsChannel { columns, values, membership, counts, factors }, shape))
@@ -223,7 +247,12 @@ impl AuthorsMaterial {
         let k = c.membership[block] as usize;
         let at = [x % EDGE, y % EDGE, light, view];
         (first..first + c.counts[block] as usize)
-            .map(|z| c.values[z] * (0..4).map(|mode| c.factor(&self.rows, mode, k, at[mode], c.columns[z][mode] as usize)).product::<f64>())
+            .map(|z| {
+                c.values[z]
+                    * (0..4)
+                        .map(|mode| c.factor(&self.rows, mode, k, at[mode], c.columns[z][mode] as usize))
+                        .product::<f64>()
+            })
             .sum()
     }
 
@@ -244,7 +273,9 @@ impl AuthorsMaterial {
             let mut spatial = [[0.0f64; EDGE]; EDGE];
             for z in starts[block]..starts[block + 1] {
                 let [lx, ly, ll, lv] = c.columns[z].map(|l| l as usize);
-                let angular = c.values[z] * c.factor(&self.rows, 2, k, light, ll) * c.factor(&self.rows, 3, k, view, lv);
+                let angular = c.values[z]
+                    * c.factor(&self.rows, 2, k, light, ll)
+                    * c.factor(&self.rows, 3, k, view, lv);
                 spatial[ly][lx] += angular;
             }
             for (ly, row) in spatial.iter().enumerate() {
@@ -252,7 +283,9 @@ impl AuthorsMaterial {
                     for y in 0..EDGE {
                         let by_y = sum * c.factor(&self.rows, 1, k, y, ly);
                         for x in 0..EDGE {
-                            let at = (block / self.blocks[0] * EDGE + y) * width + block % self.blocks[0] * EDGE + x;
+                            let at = (block / self.blocks[0] * EDGE + y) * width
+                                + block % self.blocks[0] * EDGE
+                                + x;
                             image[at] += by_y * c.factor(&self.rows, 0, k, x, lx);
                         }
                     }
@@ -265,14 +298,17 @@ impl AuthorsMaterial {
     /// Spatial mean of the normalised values for every pair.
     fn normalised_means(&self, channel: &AuthorsChannel) -> Pairs {
         let (lights, views) = (self.rows[2], self.rows[3]);
-        let mean_of = |mode: usize, k: usize, column: usize| (0..EDGE).map(|row| channel.factor(&self.rows, mode, k, row, column)).sum::<f64>() / EDGE as f64;
+        let mean_of = |mode: usize, k: usize, column: usize| {
+            (0..EDGE).map(|row| channel.factor(&self.rows, mode, k, row, column)).sum::<f64>() / EDGE as f64
+        };
         let mut sums: BTreeMap<(usize, usize, usize), f64> = BTreeMap::new();
         let mut z = 0;
         for (block, &count) in channel.counts.iter().enumerate() {
             let k = channel.membership[block] as usize;
             for _ in 0..count {
                 let [lx, ly, ll, lv] = channel.columns[z].map(|l| l as usize);
-                *sums.entry((k, ll, lv)).or_default() += channel.values[z] * mean_of(0, k, lx) * mean_of(1, k, ly);
+                *sums.entry((k, ll, lv)).or_default() +=
+                    channel.values[z] * mean_of(0, k, lx) * mean_of(1, k, ly);
                 z += 1;
             }
         }
@@ -292,7 +328,14 @@ impl AuthorsMaterial {
     /// Spatial mean of a channel for every pair, natural logarithm; of a channel without coefficients what
     /// the shared mean of all three leaves (their average is shared).
     pub fn channel_means(&self, channel: usize) -> Pairs {
-        let own = |c: &AuthorsChannel| -> Pairs { self.normalised_means(c).iter().zip(&self.deviation).zip(&self.mean).map(|((n, s), m)| n * s + m).collect() };
+        let own = |c: &AuthorsChannel| -> Pairs {
+            self.normalised_means(c)
+                .iter()
+                .zip(&self.deviation)
+                .zip(&self.mean)
+                .map(|((n, s), m)| n * s + m)
+                .collect()
+        };
         if let Some(c) = &self.channels[channel] {
             return own(c);
         }
@@ -368,13 +411,20 @@ fn scaled_column(column: &[f64]) -> (Vec<i16>, f64) {
 }
 
 /// Scaled columns of a factor that are used, and the new number and largest entry of each.
-fn used_factor(authors: &AuthorsChannel, rows: &[usize; 4], mode: usize, k: usize, used: &BTreeMap<u16, ()>) -> (FactorModel, BTreeMap<u16, (u32, f64)>) {
+fn used_factor(
+    authors: &AuthorsChannel,
+    rows: &[usize; 4],
+    mode: usize,
+    k: usize,
+    used: &BTreeMap<u16, ()>,
+) -> (FactorModel, BTreeMap<u16, (u32, f64)>) {
     let m = rows[mode];
     let mut numbers = BTreeMap::new();
     let columns: Vec<Vec<i16>> = (0u32..)
         .zip(used.keys())
         .map(|(new, &old)| {
-            let column: Vec<f64> = (0..m).map(|row| authors.factor(rows, mode, k, row, old as usize)).collect();
+            let column: Vec<f64> =
+                (0..m).map(|row| authors.factor(rows, mode, k, row, old as usize)).collect();
             let (entries, largest) = scaled_column(&column);
             numbers.insert(old, (new, largest));
             entries
@@ -401,7 +451,8 @@ fn quantise_channel(authors: &AuthorsChannel, rows: &[usize; 4], value_bits: u32
     let mut scales = Vec::new();
     for (&k, columns) in &used {
         number_of.insert(k, dictionaries.len());
-        let [x, y, light, view] = [0, 1, 2, 3].map(|mode| used_factor(authors, rows, mode, k as usize, &columns[mode]));
+        let [x, y, light, view] =
+            [0, 1, 2, 3].map(|mode| used_factor(authors, rows, mode, k as usize, &columns[mode]));
         dictionaries.push(DictionaryModel { light: light.0, view: view.0, x: x.0, y: y.0 });
         scales.push([x.1, y.1, light.1, view.1]);
     }
@@ -415,8 +466,10 @@ fn quantise_channel(authors: &AuthorsChannel, rows: &[usize; 4], value_bits: u32
             let number = number_of[k];
             let list: Vec<(AtomModel, f64)> = (starts[block]..starts[block + 1])
                 .map(|z| {
-                    let [x, y, light, view] = [0, 1, 2, 3].map(|mode| scales[number][mode][&authors.columns[z][mode]]);
-                    let atom = AtomModel { x: x.0, y: y.0, light: light.0, view: view.0, ..AtomModel::default() };
+                    let [x, y, light, view] =
+                        [0, 1, 2, 3].map(|mode| scales[number][mode][&authors.columns[z][mode]]);
+                    let atom =
+                        AtomModel { x: x.0, y: y.0, light: light.0, view: view.0, ..AtomModel::default() };
                     (atom, authors.values[z] * table_gain * x.1 * y.1 * light.1 * view.1)
                 })
                 .collect();

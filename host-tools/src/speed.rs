@@ -1,8 +1,9 @@
-//! How fast filtered samples are, of files and of baselines: in turn with a reference in one run, medians with their range.
+//! How fast filtered samples are, of files and of baselines: in turn with a reference in one run, medians
+//! with their range.
 //!
-//! Machines differ and are never quiet, so every measurement is paired: a run of the subject follows a run of the reference, which is a
-//! routine of fixed work, and the ratio of both is told beside the rate. Ratios are what two lines of
-//! a table may be compared by.
+//! Machines differ and are never quiet, so every measurement is paired: a run of the subject follows a run of
+//! the reference, which is a routine of fixed work, and the ratio of both is told beside the rate. Ratios are
+//! what two lines of a table may be compared by.
 
 use crate::baseline::decoder::{Decoder, Locator};
 use crate::random::Random;
@@ -39,7 +40,8 @@ pub struct Rate {
 pub struct Speed {
     /// Random positions and directions, one core, in batches.
     pub random: Rate,
-    /// Scan lines of a picture: neighbours in position, one light, views that move slowly; one core, in batches.
+    /// Scan lines of a picture: neighbours in position, one light, views that move slowly; one core, in
+    /// batches.
     pub coherent: Rate,
     /// Random, one by one.
     pub single: Rate,
@@ -111,15 +113,23 @@ pub fn coherent_queries(count: usize, [width, height]: [usize; 2]) -> Vec<Filter
                 tilt = random.range(100, 1200) as f64 / 1000.0;
             }
             let step = |size: usize| (1u64 << 31) / size as u64;
-            let position = |start: u32, at: usize, size: usize| start.wrapping_add((at as u64 * step(size)) as u32);
+            let position =
+                |start: u32, at: usize, size: usize| start.wrapping_add((at as u64 * step(size)) as u32);
             let (angle, azimuth) = (tilt + x as f64 / 2000.0, y as f64 / 1000.0);
-            let view = [angle.sin() * azimuth.cos(), angle.sin() * azimuth.sin(), angle.cos()].map(|c| c as f32);
-            FilteredQuery { u_q32: position(start[0], x, width), v_q32: position(start[1], y, height), light, view: Direction::from_unit_vector(view) }
+            let view =
+                [angle.sin() * azimuth.cos(), angle.sin() * azimuth.sin(), angle.cos()].map(|c| c as f32);
+            FilteredQuery {
+                u_q32: position(start[0], x, width),
+                v_q32: position(start[1], y, height),
+                light,
+                view: Direction::from_unit_vector(view),
+            }
         })
         .collect()
 }
 
-/// A routine of fixed work that other rates are divided by: thirty-six fetches of three numbers, weighed, from a table that fits into a second-level cache.
+/// A routine of fixed work that other rates are divided by: thirty-six fetches of three numbers, weighed,
+/// from a table that fits into a second-level cache.
 struct Reference {
     table: Vec<[f32; 3]>,
 }
@@ -185,7 +195,8 @@ fn parts(queries: &[FilteredQuery], samples: usize, length: usize) -> impl Itera
     })
 }
 
-/// Measures the two orders of queries, on one core and all; `batch` answers some queries and gives something that depends on all answers.
+/// Measures the two orders of queries, on one core and all; `batch` answers some queries and gives something
+/// that depends on all answers.
 fn measure<S>(
     size: [usize; 2],
     scratch: impl Fn() -> S + Sync,
@@ -203,7 +214,8 @@ fn measure<S>(
             })
         })
     };
-    let (random_one, coherent_one) = (on_one(&random, &mut of_reference), on_one(&coherent, &mut of_reference));
+    let (random_one, coherent_one) =
+        (on_one(&random, &mut of_reference), on_one(&coherent, &mut of_reference));
     let on_all = |queries: &[FilteredQuery], of_reference: &mut Vec<f64>| {
         timed(&reference, of_reference, |samples| {
             // Several for each core, so that none waits for long.
@@ -214,7 +226,8 @@ fn measure<S>(
             });
         })
     };
-    let (random_all, coherent_all) = (on_all(&random, &mut of_reference), on_all(&coherent, &mut of_reference));
+    let (random_all, coherent_all) =
+        (on_all(&random, &mut of_reference), on_all(&coherent, &mut of_reference));
     let by_one = timed(&reference, &mut of_reference, |samples| {
         (0..samples).for_each(|i| {
             black_box(single(&random[i % QUERIES]));
@@ -229,7 +242,12 @@ fn measure<S>(
         random_all,
         coherent_all,
         kernel: None,
-        reference: Rate { median: median_rate, least: of_reference[0], most: of_reference[last], to_reference: 1.0 },
+        reference: Rate {
+            median: median_rate,
+            least: of_reference[0],
+            most: of_reference[last],
+            to_reference: 1.0,
+        },
     }
 }
 
@@ -266,7 +284,13 @@ fn of_kernel(file: &Selvedge<'_>, adapter: &Adapter) -> Option<Rate> {
     use crate::gpu::{Query, direction_words};
     let gpu = adapter.gpu.as_ref()?;
     let loaded = gpu.load(std::slice::from_ref(file));
-    let of = |q: &FilteredQuery| Query { u: q.u_q32, v: q.v_q32, light: direction_words(q.light), view: direction_words(q.view), ..Query::default() };
+    let of = |q: &FilteredQuery| Query {
+        u: q.u_q32,
+        v: q.v_q32,
+        light: direction_words(q.light),
+        view: direction_words(q.view),
+        ..Query::default()
+    };
     let queries: Vec<Query> = random_queries(QUERIES).iter().map(of).collect();
     // The first run makes the pipeline; what fails there has no rate.
     gpu.answer(&loaded, "filtered", &queries[..64]).ok()?;

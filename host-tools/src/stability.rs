@@ -1,7 +1,9 @@
-//! Numerical stability on stiff and extreme cases: a table of cases, each with a bound that is stated before anything is measured.
+//! Numerical stability on stiff and extreme cases: a table of cases, each with a bound that is stated before
+//! anything is measured.
 //!
-//! A case says what makes it hard (its condition: a condition number, a dynamic range, or how extreme it is), where its bound comes from,
-//! and measures. Nothing is left out silently: a case that cannot be made is a failure. `selvedge report --stability` puts the table on a page.
+//! A case says what makes it hard (its condition: a condition number, a dynamic range, or how extreme it is),
+//! where its bound comes from, and measures. Nothing is left out silently: a case that cannot be made is a
+//! failure. `selvedge report --stability` puts the table on a page.
 
 use crate::baseline::pca::{Domain, pca};
 use crate::dataset::{Dataset, Description, Sample};
@@ -20,7 +22,9 @@ use glam::DVec3;
 use selvedge::colour::{transfer_linear, transfer_log2};
 use selvedge::fixed::{exp2_q31, multiply_q13, multiply_q15, round_shift};
 use selvedge::position::axis_at_position;
-use selvedge::tensor::{LIST_END, angular_q15, blend_light, corner_weight, lists_start, next_coefficient, open_list};
+use selvedge::tensor::{
+    LIST_END, angular_q15, blend_light, corner_weight, lists_start, next_coefficient, open_list,
+};
 use selvedge::words::word;
 use selvedge::{Direction, Limits, Selvedge, Taps};
 use serde::Serialize;
@@ -121,7 +125,13 @@ fn extreme_draw(random: &mut Random, bound: i64) -> i64 {
 }
 
 /// Largest distance of a rounded integer product from the real one, in units of the last place.
-fn product_case(name: &'static str, p_bound: i64, u_bound: i64, fraction: u32, product: fn(i32, i32) -> i32) -> Case {
+fn product_case(
+    name: &'static str,
+    p_bound: i64,
+    u_bound: i64,
+    fraction: u32,
+    product: fn(i32, i32) -> i32,
+) -> Case {
     case("arithmetic", name, "largest factor", "2.2: one rounding to nearest, half a unit", move |_| {
         let mut random = Random::new(1);
         let mut measured = 0.0f64;
@@ -143,15 +153,24 @@ fn arithmetic() -> Vec<Case> {
             let mut measured = 0.0f64;
             for _ in 0..DRAWS {
                 let (p, shift) = (extreme_draw(&mut random, (1 << 31) - 1), random.range(0, 31) as u32);
-                measured = measured.max((round_shift(p as i32, shift) as f64 - p as f64 / 2f64.powi(shift as i32)).abs());
+                measured = measured
+                    .max((round_shift(p as i32, shift) as f64 - p as f64 / 2f64.powi(shift as i32)).abs());
             }
             Ok(Outcome { condition: 2f64.powi(31), bound: 0.5, measured })
         }),
-        case("arithmetic", "exponential, every fraction", "fractions tried", "2.3: within 2^-28, relative", |_| {
-            let error = |x: u32| (exp2_q31(x) as f64 / 2f64.powi(31) / (x as f64 / 1_048_576.0).exp2() - 1.0).abs();
-            let measured = (0..1u32 << 20).map(error).fold(0.0, f64::max);
-            Ok(Outcome { condition: 1_048_576.0, bound: 2f64.powi(-28), measured })
-        }),
+        case(
+            "arithmetic",
+            "exponential, every fraction",
+            "fractions tried",
+            "2.3: within 2^-28, relative",
+            |_| {
+                let error = |x: u32| {
+                    (exp2_q31(x) as f64 / 2f64.powi(31) / (x as f64 / 1_048_576.0).exp2() - 1.0).abs()
+                };
+                let measured = (0..1u32 << 20).map(error).fold(0.0, f64::max);
+                Ok(Outcome { condition: 1_048_576.0, bound: 2f64.powi(-28), measured })
+            },
+        ),
         case(
             "arithmetic",
             "logarithm undone, powers of two from 2^-10 to 2^30",
@@ -169,29 +188,49 @@ fn arithmetic() -> Vec<Case> {
                     let found = f32::from_bits(transfer_log2(x, mantissa, exponent, 32_768)) as f64;
                     measured = measured.max((found - exact).abs() / power);
                 }
-                Ok(Outcome { condition: 2f64.powi(40), bound: 2f64.powi(-28) + 2f64.powi(-30) + 2f64.powi(-24), measured })
+                Ok(Outcome {
+                    condition: 2f64.powi(40),
+                    bound: 2f64.powi(-28) + 2f64.powi(-30) + 2f64.powi(-24),
+                    measured,
+                })
             },
         ),
-        case("arithmetic", "linear values at both ends of binary32", "largest over smallest exponent", "7.3: half a unit of binary32, relative", |_| {
-            let mut random = Random::new(4);
-            let mut measured = 0.0f64;
-            for _ in 0..DRAWS {
-                let (x, exponent) = (random.range(1, 1 << 27) as i32, random.range(-90, 90) as i32);
-                let exact = x as f64 * 2f64.powi(exponent - 20);
-                let found = f32::from_bits(transfer_linear(x, exponent, 32_768)) as f64;
-                measured = measured.max((found / exact - 1.0).abs());
-            }
-            Ok(Outcome { condition: 2f64.powi(180), bound: 2f64.powi(-24), measured })
-        }),
+        case(
+            "arithmetic",
+            "linear values at both ends of binary32",
+            "largest over smallest exponent",
+            "7.3: half a unit of binary32, relative",
+            |_| {
+                let mut random = Random::new(4);
+                let mut measured = 0.0f64;
+                for _ in 0..DRAWS {
+                    let (x, exponent) = (random.range(1, 1 << 27) as i32, random.range(-90, 90) as i32);
+                    let exact = x as f64 * 2f64.powi(exponent - 20);
+                    let found = f32::from_bits(transfer_linear(x, exponent, 32_768)) as f64;
+                    measured = measured.max((found / exact - 1.0).abs());
+                }
+                Ok(Outcome { condition: 2f64.powi(180), bound: 2f64.powi(-24), measured })
+            },
+        ),
     ]
 }
 
 /// A small legal file with these lights and views, of smooth random numbers.
-fn small_file(folder: &Path, lights: &[DVec3], views: &[DVec3], size: [usize; 2], tensor: bool) -> Result<Vec<u8>> {
-    let wave =
-        |t: usize, l: DVec3, v: DVec3, c: usize| ((t % 5) as f64 * 0.3 + 2.0 * l.x + l.y * v.x * 3.0 + v.y + c as f64 * 0.2).sin() * 0.4 + 0.6 * l.z.max(0.05);
-    let data = dataset(folder, size, lights, views, |t, l, v, c| wave(t, lights[l], views[v], c).max(0.0) as f32)?;
-    encoded(&data, if tensor { Method::Tensor } else { Method::Ensemble }, Domain::Log).map(|(bytes, _)| bytes)
+fn small_file(
+    folder: &Path,
+    lights: &[DVec3],
+    views: &[DVec3],
+    size: [usize; 2],
+    tensor: bool,
+) -> Result<Vec<u8>> {
+    let wave = |t: usize, l: DVec3, v: DVec3, c: usize| {
+        ((t % 5) as f64 * 0.3 + 2.0 * l.x + l.y * v.x * 3.0 + v.y + c as f64 * 0.2).sin() * 0.4
+            + 0.6 * l.z.max(0.05)
+    };
+    let data =
+        dataset(folder, size, lights, views, |t, l, v, c| wave(t, lights[l], views[v], c).max(0.0) as f32)?;
+    encoded(&data, if tensor { Method::Tensor } else { Method::Ensemble }, Domain::Log)
+        .map(|(bytes, _)| bytes)
 }
 
 fn opened(bytes: &[u8]) -> Result<Selvedge<'_>> {
@@ -216,7 +255,11 @@ fn weight_defect(taps: Taps) -> f64 {
 /// Sets of directions that triangulations find hard.
 fn hard_sets() -> Vec<(&'static str, Vec<DVec3>)> {
     let grid = |n| directions::grid(n).expect("known");
-    let ring = |count: usize, polar: f64| (0..count).map(|i| directions::from_degrees(polar, i as f64 * 360.0 / count as f64)).collect::<Vec<_>>();
+    let ring = |count: usize, polar: f64| {
+        (0..count)
+            .map(|i| directions::from_degrees(polar, i as f64 * 360.0 / count as f64))
+            .collect::<Vec<_>>()
+    };
     let mut near = grid(81);
     // The least distance that two points of 14 bits can have, and a little more.
     for i in [20, 40, 60] {
@@ -238,8 +281,12 @@ fn hard_sets() -> Vec<(&'static str, Vec<DVec3>)> {
 }
 
 fn weights() -> Vec<Case> {
-    let mut cases =
-        vec![case("weights", "bilinear weights, every size up to 64 and the largest", "largest size", "6.3: none negative, their sum 2^15 exactly", |_| {
+    let mut cases = vec![case(
+        "weights",
+        "bilinear weights, every size up to 64 and the largest",
+        "largest size",
+        "6.3: none negative, their sum 2^15 exactly",
+        |_| {
             let mut random = Random::new(5);
             let mut measured = 0.0f64;
             for size in (1..=64).chain([16_383, 16_384]) {
@@ -248,20 +295,26 @@ fn weights() -> Vec<Case> {
                         0 => 0,
                         1 => u32::MAX,
                         // Near the centre of a texel and between two.
-                        _ if i % 2 == 0 => ((random.range(0, 2 * size as i64) << 31) / size as i64 + random.range(-3, 3)) as u32,
+                        _ if i % 2 == 0 => {
+                            ((random.range(0, 2 * size as i64) << 31) / size as i64 + random.range(-3, 3))
+                                as u32
+                        }
                         _ => random.word(),
                     };
                     for edge in [1u32, 3, 16] {
                         let axis = axis_at_position(edge, (1u32 << 18).div_ceil(edge), size, position);
-                        let spans = if axis.count == 2 { vec![axis.first, axis.second] } else { vec![axis.first] };
+                        let spans =
+                            if axis.count == 2 { vec![axis.first, axis.second] } else { vec![axis.first] };
                         let sum: i32 = spans.iter().map(|s| s.weight_a_q15 + s.weight_b_q15).sum();
-                        let least = spans.iter().map(|s| s.weight_a_q15.min(s.weight_b_q15)).min().unwrap_or(0);
+                        let least =
+                            spans.iter().map(|s| s.weight_a_q15.min(s.weight_b_q15)).min().unwrap_or(0);
                         measured = measured.max((sum - 32_768).abs().max(-least) as f64);
                     }
                 }
             }
             Ok(Outcome { condition: 16_384.0, bound: 0.0, measured })
-        })];
+        },
+    )];
     for (name, set) in hard_sets() {
         let condition = nearest_pair(&set);
         cases.push(case(
@@ -339,11 +392,15 @@ fn directions_at_ends() -> Vec<Case> {
                         // The place on the hull's edge that is nearest to the point on the disc's border.
                         measured = measured.max(weight_defect(b));
                         if below < 91.0 {
-                            measured = measured
-                                .max(f64::from(u8::from((a.a, a.b) != (b.a, b.b) && (a.a, a.b) != (b.b, b.a) && a.weight_a_q15.max(a.weight_b_q15) < 32_000)));
+                            measured = measured.max(f64::from(u8::from(
+                                (a.a, a.b) != (b.a, b.b)
+                                    && (a.a, a.b) != (b.b, b.a)
+                                    && a.weight_a_q15.max(a.weight_b_q15) < 32_000,
+                            )));
                         }
                         let rgb = file.filtered(0, 0, at(below), at(30.0)).to_f32();
-                        measured = measured.max(f64::from(u8::from(rgb.iter().any(|c| !c.is_finite() || *c < 0.0))));
+                        measured =
+                            measured.max(f64::from(u8::from(rgb.iter().any(|c| !c.is_finite() || *c < 0.0))));
                     }
                 }
                 Ok(Outcome { condition: 89.0, bound: 0.0, measured })
@@ -364,14 +421,21 @@ fn directions_at_ends() -> Vec<Case> {
     cases
 }
 
-/// The largest change of a channel value in one step of a light, view or position, against what the weights allow.
+/// The largest change of a channel value in one step of a light, view or position, against what the weights
+/// allow.
 fn continuity(folder: &Path, tensor: bool, what: &str) -> Result<Outcome> {
     let set = directions::grid(81).expect("known");
     let bytes = small_file(folder, &set, &set, [6, 6], tensor)?;
     let file = opened(&bytes)?;
-    // The least height of a triangle of the set, in steps of Q18; positions: texels are 2^32 / 6 apart, a step is 2^10.
+    // The least height of a triangle of the set, in steps of Q18; positions: texels are 2^32 / 6 apart, a
+    // step is 2^10.
     let points: Vec<[i32; 2]> = set.iter().map(|&d| project(d)).collect();
-    let least = triangulate(&points, None).triangles.iter().map(|t| height(t.map(|i| points[i as usize]))).fold(f64::MAX, f64::min) * 16.0;
+    let least = triangulate(&points, None)
+        .triangles
+        .iter()
+        .map(|t| height(t.map(|i| points[i as usize])))
+        .fold(f64::MAX, f64::min)
+        * 16.0;
     let step_of_weight = if what == "position" { 1024.0 * 6.0 / 2f64.powi(17) } else { 32_768.0 / least };
     let values = |u: u32, v: u32, light: Direction, view: Direction| {
         let found = file.filtered_values(u, v, file.locate_light(light), file.locate_view(view));
@@ -382,7 +446,11 @@ fn continuity(folder: &Path, tensor: bool, what: &str) -> Result<Outcome> {
     for _ in 0..60 {
         // Walks begin a little before a texel's centre, where the texels change that a sample is between.
         let centre = |random: &mut Random| (((2 * random.range(0, 5) + 1) << 31) / 6 - 1500 * 1024) as u32;
-        let (mut u, mut v) = if what == "position" { (centre(&mut random), centre(&mut random)) } else { (random.word(), random.word()) };
+        let (mut u, mut v) = if what == "position" {
+            (centre(&mut random), centre(&mut random))
+        } else {
+            (random.word(), random.word())
+        };
         let (mut light, mut view) = (direction(upward(&mut random)), direction(upward(&mut random)));
         let along = [random.range(-1, 1) as i32, 1];
         let mut before: Option<[f64; 3]> = None;
@@ -402,7 +470,8 @@ fn continuity(folder: &Path, tensor: bool, what: &str) -> Result<Outcome> {
             steps += 1.0;
         }
     }
-    // Three weights change by at most a diagonal step and a rounding each, and meet at most the range of values.
+    // Three weights change by at most a diagonal step and a rounding each, and meet at most the range of
+    // values.
     let bound = (range[1] - range[0]) * 3.0 * (1.5 * step_of_weight + 1.0) / 32_768.0 + 8.0;
     Ok(Outcome { condition: steps, bound, measured })
 }
@@ -414,7 +483,8 @@ fn is_inside(corners: [[i32; 2]; 3], p: [i32; 2]) -> bool {
         [x, y, x * x + y * y]
     });
     let [a, b, c] = rows;
-    let determinant = a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
+    let determinant = a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0])
+        + a[2] * (b[0] * c[1] - b[1] * c[0]);
     let [u, v, w] = corners.map(|c| c.map(i128::from));
     let turn = (v[0] - u[0]) * (w[1] - u[1]) - (v[1] - u[1]) * (w[0] - u[0]);
     determinant * turn.signum() > 0
@@ -424,7 +494,8 @@ fn is_inside(corners: [[i32; 2]; 3], p: [i32; 2]) -> bool {
 fn height(t: [[i32; 2]; 3]) -> f64 {
     let side = |a: [i32; 2], b: [i32; 2]| ((a[0] - b[0]) as f64).hypot((a[1] - b[1]) as f64);
     let [a, b, c] = t;
-    let area = ((b[0] - a[0]) as f64 * (c[1] - a[1]) as f64 - (b[1] - a[1]) as f64 * (c[0] - a[0]) as f64).abs();
+    let area =
+        ((b[0] - a[0]) as f64 * (c[1] - a[1]) as f64 - (b[1] - a[1]) as f64 * (c[0] - a[0]) as f64).abs();
     area / side(a, b).max(side(b, c)).max(side(c, a))
 }
 
@@ -457,8 +528,16 @@ fn largest_legal() -> Vec<Case> {
                     let bytes = write_material(&extreme_tensor(seed));
                     let file = opened(&bytes)?;
                     for _ in 0..if file.material().full_count > 0 { 200 } else { 0 } {
-                        let (light, view) = (file.locate_light(direction(upward(&mut random))), file.locate_view(direction(upward(&mut random))));
-                        measured = measured.max(largest_layer_sum(&file, [random.word(), random.word()], light, view));
+                        let (light, view) = (
+                            file.locate_light(direction(upward(&mut random))),
+                            file.locate_view(direction(upward(&mut random))),
+                        );
+                        measured = measured.max(largest_layer_sum(
+                            &file,
+                            [random.word(), random.word()],
+                            light,
+                            view,
+                        ));
                         samples += 1.0;
                     }
                 }
@@ -483,7 +562,8 @@ fn largest_legal() -> Vec<Case> {
                         let (light, view) = (direction(upward(&mut random)), direction(upward(&mut random)));
                         let (u, v) = (random.word(), random.word());
                         let rgb = file.filtered(u, v, light, view).to_f32();
-                        measured += rgb.iter().filter(|c| !c.is_finite() || c.is_sign_negative()).count() as f64;
+                        measured +=
+                            rgb.iter().filter(|c| !c.is_finite() || c.is_sign_negative()).count() as f64;
                         samples += 1.0;
                     }
                 }
@@ -494,14 +574,19 @@ fn largest_legal() -> Vec<Case> {
     cases
 }
 
-/// The largest sum of a layer before it is limited: magnitudes of the weights of an atom, and of the products of all atoms, added in wide integers.
+/// The largest sum of a layer before it is limited: magnitudes of the weights of an atom, and of the products
+/// of all atoms, added in wide integers.
 fn largest_layer_sum(file: &Selvedge<'_>, position: [u32; 2], light: Taps, view: Taps) -> f64 {
     let (words, m) = (file.words(), file.material());
     let atoms = word(words, m.fibres_start);
     let ends = |size: u32, at: u32| {
         let axis = axis_at_position(m.edge, m.edge_reciprocal_q18, size, at);
         let whole = [(axis.first.block, 32_768)].to_vec();
-        if axis.count == 2 { vec![(axis.first.block, axis.first.weight_a_q15), (axis.second.block, axis.second.weight_a_q15)] } else { whole }
+        if axis.count == 2 {
+            vec![(axis.first.block, axis.first.weight_a_q15), (axis.second.block, axis.second.weight_a_q15)]
+        } else {
+            whole
+        }
     };
     let (x, y) = (ends(m.width, position[0]), ends(m.height, position[1]));
     let mut largest = 0i64;
@@ -525,7 +610,8 @@ fn largest_layer_sum(file: &Selvedge<'_>, position: [u32; 2], light: Taps, view:
             let shifts = word(words, m.fibres_start + 2 + atom);
             let found = angular_q15(words, m, atom, shifts & 31, light, view);
             for (sum, angular) in sums.iter_mut().zip([found.c0, found.c1, found.c2]) {
-                *sum += round_shift(multiply_q15(weight as i32, angular), shifts >> 5 & 31).unsigned_abs() as i64;
+                *sum +=
+                    round_shift(multiply_q15(weight as i32, angular), shifts >> 5 & 31).unsigned_abs() as i64;
             }
         }
         largest = sums.into_iter().fold(largest, i64::max);
@@ -533,7 +619,8 @@ fn largest_layer_sum(file: &Selvedge<'_>, position: [u32; 2], light: Taps, view:
     largest as f64
 }
 
-/// The largest sum of magnitudes of all products of an ABRDF atom, in wide integers, over all pairs of directions.
+/// The largest sum of magnitudes of all products of an ABRDF atom, in wide integers, over all pairs of
+/// directions.
 fn largest_fibre_sum(file: &Selvedge<'_>) -> f64 {
     let (words, m) = (file.words(), file.material());
     if m.full_count == 0 {
@@ -543,7 +630,15 @@ fn largest_fibre_sum(file: &Selvedge<'_>) -> f64 {
     let (entries, index_bits) = (shape & 0xff, shape >> 8 & 15);
     let (table, light_atoms) = (m.fibres_start + 2 + atoms, word(words, m.light_atoms_start));
     // One light at full weight: the largest that a blend can be.
-    let tap = |a| Taps { a, b: a, c: a, weight_a_q15: 32_768, weight_b_q15: 0, weight_c_q15: 0, cosine_q15: 32_768 };
+    let tap = |a| Taps {
+        a,
+        b: a,
+        c: a,
+        weight_a_q15: 32_768,
+        weight_b_q15: 0,
+        weight_c_q15: 0,
+        cosine_q15: 32_768,
+    };
     let mut largest = 0i64;
     for view in 0..m.view_count {
         for atom in 0..atoms {
@@ -556,7 +651,9 @@ fn largest_fibre_sum(file: &Selvedge<'_>) -> f64 {
                     let value = (((entry - index) << 16) as i32 >> 16) as i64;
                     let h = (value * 32_768 + 0x10000) >> 17;
                     let l = word(words, m.light_atoms_start + 2 + light * light_atoms + index);
-                    (0..3).for_each(|c| sums[c as usize] += (h * blend_light(l, l, l, tap(light), c) as i64).abs());
+                    (0..3).for_each(|c| {
+                        sums[c as usize] += (h * blend_light(l, l, l, tap(light), c) as i64).abs()
+                    });
                 }
                 // Three views share the weight, but each may be rounded up.
                 largest = largest.max(sums.into_iter().max().unwrap_or(0));
@@ -569,10 +666,14 @@ fn largest_fibre_sum(file: &Selvedge<'_>) -> f64 {
 /// A random matrix with singular values that fall from one to `1 / condition`, `rows x columns`, row-major.
 fn conditioned(rows: usize, columns: usize, condition: f64, seed: u64) -> Vec<f32> {
     let mut random = Random::new(seed);
-    let mut draw = |n: usize| -> Vec<f64> { (0..n).map(|_| random.range(-1_000_000, 1_000_000) as f64 / 1e6).collect() };
-    let (u, v) = (orthonormal(&draw(rows * columns), columns), orthonormal(&draw(columns * columns), columns));
+    let mut draw =
+        |n: usize| -> Vec<f64> { (0..n).map(|_| random.range(-1_000_000, 1_000_000) as f64 / 1e6).collect() };
+    let (u, v) =
+        (orthonormal(&draw(rows * columns), columns), orthonormal(&draw(columns * columns), columns));
     let s = |k: usize| condition.powf(-(k as f64) / (columns as f64 - 1.0));
-    (0..rows * columns).map(|i| (0..columns).map(|k| u[(i / columns, k)] * s(k) * v[(i % columns, k)]).sum::<f64>() as f32).collect()
+    (0..rows * columns)
+        .map(|i| (0..columns).map(|k| u[(i / columns, k)] * s(k) * v[(i % columns, k)]).sum::<f64>() as f32)
+        .collect()
 }
 
 fn linear_algebra() -> Vec<Case> {
@@ -588,9 +689,16 @@ fn linear_algebra() -> Vec<Case> {
                 let matrix = conditioned(rows, columns, condition, 1);
                 let mut single = vec![0.0f32; columns * columns];
                 product_at(&mut single, &matrix, &matrix, [columns, rows, columns], false);
-                let exact = |i: usize, j: usize| (0..rows).map(|r| matrix[r * columns + i] as f64 * matrix[r * columns + j] as f64).sum::<f64>();
+                let exact = |i: usize, j: usize| {
+                    (0..rows)
+                        .map(|r| matrix[r * columns + i] as f64 * matrix[r * columns + j] as f64)
+                        .sum::<f64>()
+                };
                 let largest = (0..columns).map(|i| exact(i, i)).fold(0.0, f64::max);
-                let measured = (0..columns * columns).map(|i| (single[i] as f64 - exact(i / columns, i % columns)).abs()).fold(0.0, f64::max) / largest;
+                let measured = (0..columns * columns)
+                    .map(|i| (single[i] as f64 - exact(i / columns, i % columns)).abs())
+                    .fold(0.0, f64::max)
+                    / largest;
                 Ok(Outcome { condition, bound: 4.0 * (rows as f64).sqrt() * 2f64.powi(-24), measured })
             },
         ));
@@ -603,22 +711,47 @@ fn linear_algebra() -> Vec<Case> {
                 let (rows, columns) = (512, 32);
                 let matrix = conditioned(rows, columns, condition.sqrt(), 2);
                 let moments: Vec<f64> = (0..columns * columns)
-                    .map(|i| (0..rows).map(|r| matrix[r * columns + i / columns] as f64 * matrix[r * columns + i % columns] as f64).sum())
+                    .map(|i| {
+                        (0..rows)
+                            .map(|r| {
+                                matrix[r * columns + i / columns] as f64
+                                    * matrix[r * columns + i % columns] as f64
+                            })
+                            .sum()
+                    })
                     .collect();
                 let (basis, _) = eigenbasis(&moments, columns);
-                Ok(Outcome { condition, bound: (columns as f64).sqrt() * 2f64.powi(-23), measured: basis.defect() })
+                Ok(Outcome {
+                    condition,
+                    bound: (columns as f64).sqrt() * 2f64.powi(-23),
+                    measured: basis.defect(),
+                })
             },
         ));
     }
-    cases.push(case("training", "orthogonal factor of a singular matrix (Procrustes)", "condition number", "orthonormal: sqrt(n) 2^-23", |_| {
-        let n = 16;
-        let matrix: Vec<f64> = conditioned(n, n, 1e30, 3).into_iter().map(f64::from).collect();
-        let basis = nearest_orthogonal(&matrix, n).ok_or_else(|| ToolError::Mismatch("no decomposition".into()))?;
-        Ok(Outcome { condition: 1e30, bound: (n as f64).sqrt() * 2f64.powi(-23), measured: basis.defect() })
-    }));
-    for (name, rank, scale) in
-        [("rank three", 3, 1.0), ("rank one", 1, 1.0), ("rank three, values of 1e-12", 3, 1e-12), ("rank three, values of 1e12", 3, 1e12)]
-    {
+    cases.push(case(
+        "training",
+        "orthogonal factor of a singular matrix (Procrustes)",
+        "condition number",
+        "orthonormal: sqrt(n) 2^-23",
+        |_| {
+            let n = 16;
+            let matrix: Vec<f64> = conditioned(n, n, 1e30, 3).into_iter().map(f64::from).collect();
+            let basis = nearest_orthogonal(&matrix, n)
+                .ok_or_else(|| ToolError::Mismatch("no decomposition".into()))?;
+            Ok(Outcome {
+                condition: 1e30,
+                bound: (n as f64).sqrt() * 2f64.powi(-23),
+                measured: basis.defect(),
+            })
+        },
+    ));
+    for (name, rank, scale) in [
+        ("rank three", 3, 1.0),
+        ("rank one", 1, 1.0),
+        ("rank three, values of 1e-12", 3, 1e-12),
+        ("rank three, values of 1e12", 3, 1e12),
+    ] {
         cases.push(case(
             "training",
             format!("components of a material of {name}"),
@@ -655,7 +788,8 @@ fn near_parallel(angle: f64) -> (Rows, Rows) {
         let aside: Vec<f32> = (0..dim).map(|_| random.range(-1000, 1000) as f32 / 1000.0).collect();
         let length = (dot(&draw, &draw) / dot(&aside, &aside)).sqrt() * angle;
         atoms.row_mut(2 * i).copy_from_slice(&draw);
-        let turned: Vec<f32> = draw.iter().zip(&aside).map(|(a, b)| (*a as f64 + length * *b as f64) as f32).collect();
+        let turned: Vec<f32> =
+            draw.iter().zip(&aside).map(|(a, b)| (*a as f64 + length * *b as f64) as f32).collect();
         atoms.row_mut(2 * i + 1).copy_from_slice(&turned);
         normalise(atoms.row_mut(2 * i));
         normalise(atoms.row_mut(2 * i + 1));
@@ -702,19 +836,30 @@ fn pursuit() -> Vec<Case> {
     }
     cases.push(case("pursuit", "a sample of zeros", "atoms", "no term, no error", |_| {
         let (atoms, _) = near_parallel(0.1);
-        let code = pursue(&vec![0.0; atoms.count()], 0.0, &gram(&atoms), Pursuit { most: 8, least_gain: 0.0 });
-        Ok(Outcome { condition: atoms.count() as f64, bound: 0.0, measured: code.terms.len() as f64 + code.errors.iter().sum::<f64>() })
+        let code =
+            pursue(&vec![0.0; atoms.count()], 0.0, &gram(&atoms), Pursuit { most: 8, least_gain: 0.0 });
+        Ok(Outcome {
+            condition: atoms.count() as f64,
+            bound: 0.0,
+            measured: code.terms.len() as f64 + code.errors.iter().sum::<f64>(),
+        })
     }));
-    cases.push(case("pursuit", "dead atoms are replaced", "atoms that no sample uses", "every atom is a unit vector after an iteration, 2^-20", |_| {
-        let (_, samples) = near_parallel(0.1);
-        let mut atoms = Rows::zeros(40, samples.dim);
-        // Forty copies of one atom: all but one are dead.
-        (0..40).for_each(|i| atoms.row_mut(i)[0] = 1.0);
-        let found = iterate(&samples, &mut atoms, Pursuit { most: 3, least_gain: 0.0 });
-        let defect = (0..40).map(|i| (dot(atoms.row(i), atoms.row(i)) - 1.0).abs()).fold(0.0, f64::max);
-        let measured = if found.revived >= 30 { defect } else { f64::INFINITY };
-        Ok(Outcome { condition: 39.0, bound: 2f64.powi(-20), measured })
-    }));
+    cases.push(case(
+        "pursuit",
+        "dead atoms are replaced",
+        "atoms that no sample uses",
+        "every atom is a unit vector after an iteration, 2^-20",
+        |_| {
+            let (_, samples) = near_parallel(0.1);
+            let mut atoms = Rows::zeros(40, samples.dim);
+            // Forty copies of one atom: all but one are dead.
+            (0..40).for_each(|i| atoms.row_mut(i)[0] = 1.0);
+            let found = iterate(&samples, &mut atoms, Pursuit { most: 3, least_gain: 0.0 });
+            let defect = (0..40).map(|i| (dot(atoms.row(i), atoms.row(i)) - 1.0).abs()).fold(0.0, f64::max);
+            let measured = if found.revived >= 30 { defect } else { f64::INFINITY };
+            Ok(Outcome { condition: 39.0, bound: 2f64.powi(-20), measured })
+        },
+    ));
     cases
 }
 
@@ -725,10 +870,24 @@ enum Method {
 }
 
 /// A dataset of a function of texel, light, view and colour.
-fn dataset(folder: &Path, size: [usize; 2], lights: &[DVec3], views: &[DVec3], value: impl Fn(usize, usize, usize, usize) -> f32) -> Result<Dataset> {
+fn dataset(
+    folder: &Path,
+    size: [usize; 2],
+    lights: &[DVec3],
+    views: &[DVec3],
+    value: impl Fn(usize, usize, usize, usize) -> f32,
+) -> Result<Dataset> {
     let path = folder.join("case.selvset");
-    let description = Description { size, lights: lights.to_vec(), views: views.to_vec(), sample: Sample::Float, ..Description::default() };
-    Dataset::from_fn(&path, description, |texel, i| value(texel, i / 3 % lights.len(), i / 3 / lights.len(), i % 3))
+    let description = Description {
+        size,
+        lights: lights.to_vec(),
+        views: views.to_vec(),
+        sample: Sample::Float,
+        ..Description::default()
+    };
+    Dataset::from_fn(&path, description, |texel, i| {
+        value(texel, i / 3 % lights.len(), i / 3 / lights.len(), i % 3)
+    })
 }
 
 /// A file of a dataset, as exact as its encoder makes it, and the error that the encoder states.
@@ -736,12 +895,21 @@ fn encoded(data: &Dataset, method: Method, domain: Domain) -> Result<(Vec<u8>, f
     if method == Method::Tensor {
         let components = pca(data, domain, 24)?;
         let shape = fit::Shape { light_atoms: 12, abrdf_atoms: 24, entries: 6, coefficients: 8 };
-        let options = tensor::Options { shape, goal: tensor::Goal::All, value_bits: Some(12), training: fit::Training { iterations: 6, rounds: 2, seed: 1 } };
+        let options = tensor::Options {
+            shape,
+            goal: tensor::Goal::All,
+            value_bits: Some(12),
+            training: fit::Training { iterations: 6, rounds: 2, seed: 1 },
+        };
         let made = tensor::encode(&components, &[], &options, |_, _, _| ())?;
         return Ok((made.bytes, made.predicted_rms));
     }
     let prepared = prepare(vec![data], tensor::transfer_of(data, domain), &|_, _| ())?;
-    let options = encode::Options { edge: 4, goal: encode::Goal::Coefficients([60, 30, 30]), ..encode::Options::default() };
+    let options = encode::Options {
+        edge: 4,
+        goal: encode::Goal::Coefficients([60, 30, 30]),
+        ..encode::Options::default()
+    };
     let made = encode::encode(&prepared, &prepared.own_ensembles(4), &options, &|_, _| ())?;
     // What is stated is of whole blocks, of which the image may be a part that has all of the error.
     let [width, height] = data.description().size;
@@ -759,8 +927,17 @@ fn no_numbers() -> Case {
         "none is taken: the first check of every value that is written to a dataset",
         |folder| {
             let set = directions::grid(81).expect("known");
-            let taken = |&bad: &f32| dataset(folder, [3, 2], &set[..4], &set[..5], |t, l, _, c| if t == 4 && l == 1 && c == 2 { bad } else { 0.5 }).is_ok();
-            Ok(Outcome { condition: BAD.len() as f64, bound: 0.0, measured: BAD.iter().filter(|bad| taken(bad)).count() as f64 })
+            let taken = |&bad: &f32| {
+                dataset(folder, [3, 2], &set[..4], &set[..5], |t, l, _, c| {
+                    if t == 4 && l == 1 && c == 2 { bad } else { 0.5 }
+                })
+                .is_ok()
+            };
+            Ok(Outcome {
+                condition: BAD.len() as f64,
+                bound: 0.0,
+                measured: BAD.iter().filter(|bad| taken(bad)).count() as f64,
+            })
         },
     )
 }
@@ -773,23 +950,40 @@ fn smooth(t: usize, l: usize, v: usize, c: usize) -> f32 {
 }
 
 /// Name, texels, lights, views and values.
-const MATERIALS: [(&str, [usize; 2], usize, usize, Value); 15] = [
-    ("a highlight 1e3 times the rest", [12, 9], 9, 7, |t, l, v, c| if l == v && t % 3 == 0 { 200.0 } else { smooth(t, l, v, c) }),
-    ("a highlight 1e4 times the rest", [12, 9], 9, 7, |t, l, v, c| if l == v && t % 3 == 0 { 2000.0 } else { smooth(t, l, v, c) }),
-    ("a highlight 1e6 times the rest", [12, 9], 9, 7, |t, l, v, c| if l == v && t % 3 == 0 { 600.0 } else { smooth(t, l, v, c) * 0.003 }),
-    ("one texel with a highlight 1e6 times the rest", [12, 9], 9, 7, |t, l, v, c| if t == 40 && l == 3 && v == 2 { 600.0 } else { smooth(t, l, v, c) * 0.003 }),
-    ("zeros in a third of all", [12, 9], 9, 7, |t, l, v, c| if (t + l + v) % 3 == 0 { 0.0 } else { smooth(t, l, v, c) }),
-    ("all black", [12, 9], 9, 7, |_, _, _, _| 0.0),
-    ("constant", [12, 9], 9, 7, |_, _, _, _| 0.75),
-    ("rank one", [12, 9], 9, 7, |t, l, v, c| (1.0 + t as f32 * 0.1) * (0.2 + ((l + 2 * v + c) % 11) as f32 * 0.05)),
-    ("one image without variance", [12, 9], 9, 7, |t, l, v, c| if l == 3 && v == 2 { 0.4 } else { smooth(t, l, v, c) }),
-    ("one texel", [1, 1], 9, 7, smooth),
-    ("one light and one view", [12, 9], 1, 1, smooth),
-    ("one number", [1, 1], 1, 1, |_, _, _, _| 0.25),
-    ("a size that blocks do not divide", [13, 7], 9, 7, smooth),
-    ("the top of binary16", [12, 9], 9, 7, |t, l, v, c| 65_504.0 * (0.3 + smooth(t, l, v, c))),
-    ("the bottom of binary16", [12, 9], 9, 7, |t, l, v, c| 6e-8 * (1.0 + (10.0 * smooth(t, l, v, c)).floor())),
-];
+const MATERIALS: [(&str, [usize; 2], usize, usize, Value); 15] =
+    [
+        ("a highlight 1e3 times the rest", [12, 9], 9, 7, |t, l, v, c| {
+            if l == v && t % 3 == 0 { 200.0 } else { smooth(t, l, v, c) }
+        }),
+        ("a highlight 1e4 times the rest", [12, 9], 9, 7, |t, l, v, c| {
+            if l == v && t % 3 == 0 { 2000.0 } else { smooth(t, l, v, c) }
+        }),
+        ("a highlight 1e6 times the rest", [12, 9], 9, 7, |t, l, v, c| {
+            if l == v && t % 3 == 0 { 600.0 } else { smooth(t, l, v, c) * 0.003 }
+        }),
+        ("one texel with a highlight 1e6 times the rest", [12, 9], 9, 7, |t, l, v, c| {
+            if t == 40 && l == 3 && v == 2 { 600.0 } else { smooth(t, l, v, c) * 0.003 }
+        }),
+        ("zeros in a third of all", [12, 9], 9, 7, |t, l, v, c| {
+            if (t + l + v) % 3 == 0 { 0.0 } else { smooth(t, l, v, c) }
+        }),
+        ("all black", [12, 9], 9, 7, |_, _, _, _| 0.0),
+        ("constant", [12, 9], 9, 7, |_, _, _, _| 0.75),
+        ("rank one", [12, 9], 9, 7, |t, l, v, c| {
+            (1.0 + t as f32 * 0.1) * (0.2 + ((l + 2 * v + c) % 11) as f32 * 0.05)
+        }),
+        ("one image without variance", [12, 9], 9, 7, |t, l, v, c| {
+            if l == 3 && v == 2 { 0.4 } else { smooth(t, l, v, c) }
+        }),
+        ("one texel", [1, 1], 9, 7, smooth),
+        ("one light and one view", [12, 9], 1, 1, smooth),
+        ("one number", [1, 1], 1, 1, |_, _, _, _| 0.25),
+        ("a size that blocks do not divide", [13, 7], 9, 7, smooth),
+        ("the top of binary16", [12, 9], 9, 7, |t, l, v, c| 65_504.0 * (0.3 + smooth(t, l, v, c))),
+        ("the bottom of binary16", [12, 9], 9, 7, |t, l, v, c| {
+            6e-8 * (1.0 + (10.0 * smooth(t, l, v, c)).floor())
+        }),
+    ];
 
 fn materials() -> Vec<Case> {
     let mut cases = Vec::new();
@@ -855,7 +1049,11 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let verdicts = run(folder.path(), |_, _| ());
         assert!(verdicts.len() >= 40, "{}", verdicts.len());
-        let broken: Vec<String> = verdicts.iter().filter(|v| !v.holds()).map(|v| format!("{}: {}: {:?}", v.group, v.name, v.outcome)).collect();
+        let broken: Vec<String> = verdicts
+            .iter()
+            .filter(|v| !v.holds())
+            .map(|v| format!("{}: {}: {:?}", v.group, v.name, v.outcome))
+            .collect();
         assert!(broken.is_empty(), "{} of {} cases:\n{}", broken.len(), verdicts.len(), broken.join("\n"));
     }
 }

@@ -1,5 +1,5 @@
-//! The encoder's part of the demo: materials are modelled, dictionaries trained, a third material encoded with and without
-//! them, measured against its data, and shown.
+//! The encoder's part of the demo: materials are modelled, dictionaries trained, a third material encoded
+//! with and without them, measured against its data, and shown.
 
 use crate::dataset::{Dataset, Sample};
 use crate::dictionary_file::{self, Training};
@@ -36,24 +36,45 @@ pub fn tell(out: &Path, say: &mut dyn FnMut(String)) -> Result<Story> {
     let data_folder = out.join("data");
     std::fs::create_dir_all(&data_folder).map_err(ToolError::io(&data_folder))?;
     let mut datasets = Vec::new();
-    for (kind, size, seed) in [(Mesostructure::Cloth, SIZE, 1), (Mesostructure::Knit, 32, 2), (Mesostructure::Tissue, 32, 3)] {
+    for (kind, size, seed) in
+        [(Mesostructure::Cloth, SIZE, 1), (Mesostructure::Knit, 32, 2), (Mesostructure::Tissue, 32, 3)]
+    {
         let path = data_folder.join(format!("{}.selvset", kind.name()));
-        let request = Request { kind, size: [size, size], directions: 81, seed, samples: 4, sample: Sample::Half };
+        let request =
+            Request { kind, size: [size, size], directions: 81, seed, samples: 4, sample: Sample::Half };
         synthesise(&request, &path, &|_, _| ())?;
         let dataset = Dataset::open(&path)?;
         let (bytes, largest) = (dataset.description().half_bytes(), dataset.statistics().largest);
-        say(format!("modelled {}: {size} x {size} texels, 81 x 81 directions, {bytes} bytes, values up to {largest:.2}", kind.name()));
+        say(format!(
+            "modelled {}: {size} x {size} texels, 81 x 81 directions, {bytes} bytes, values up to {largest:.2}",
+            kind.name()
+        ));
         datasets.push(dataset);
     }
-    let [cloth, others @ ..] = datasets.as_slice() else { return Err(ToolError::Mismatch("no dataset".into())) };
+    let [cloth, others @ ..] = datasets.as_slice() else {
+        return Err(ToolError::Mismatch("no dataset".into()));
+    };
 
-    let options = train::Options { dictionaries: 4, sparsity: [64, 16, 16], edge: 4, blocks: 128, iterations: 6, ..train::Options::default() };
+    let options = train::Options {
+        dictionaries: 4,
+        sparsity: [64, 16, 16],
+        edge: 4,
+        blocks: 128,
+        iterations: 6,
+        ..train::Options::default()
+    };
     let references: Vec<&Dataset> = others.iter().collect();
     let Some(trained) = train::train(&references, &options, None, &mut |_| true)? else {
         return Err(ToolError::Mismatch("the training was stopped".into()));
     };
-    let ends = trained.objectives.each_ref().map(|o| format!("{:.3} to {:.3}", o.first().unwrap_or(&0.0), o.last().unwrap_or(&0.0)));
-    say(format!("trained 4 dictionaries a channel on knit and tissue: error over energy {}", ends.join(", ")));
+    let ends = trained
+        .objectives
+        .each_ref()
+        .map(|o| format!("{:.3} to {:.3}", o.first().unwrap_or(&0.0), o.last().unwrap_or(&0.0)));
+    say(format!(
+        "trained 4 dictionaries a channel on knit and tissue: error over energy {}",
+        ends.join(", ")
+    ));
     let description = others[0].description();
     let training = Training {
         lights: description.lights.clone(),
@@ -63,7 +84,10 @@ pub fn tell(out: &Path, say: &mut dyn FnMut(String)) -> Result<Story> {
         objectives: trained.objectives.clone(),
         members: trained.members.clone(),
     };
-    let metadata = MetadataModel { texts: ["demo".into(), "trained on knit and tissue".into(), "CC0-1.0".into()], ..MetadataModel::default() };
+    let metadata = MetadataModel {
+        texts: ["demo".into(), "trained on knit and tissue".into(), "CC0-1.0".into()],
+        ..MetadataModel::default()
+    };
     let dictionary_path = out.join("knit-and-tissue.selvdict");
     files::write(&dictionary_path, &dictionary_file::to_bytes(&trained, &training, metadata))?;
     let dictionary = dictionary_file::from_bytes(&dictionary_path, files::read(&dictionary_path)?)?;
@@ -95,7 +119,13 @@ pub fn tell(out: &Path, say: &mut dyn FnMut(String)) -> Result<Story> {
         );
     };
     for ratio in RATIOS {
-        let verified = encode_verified(&prepared, &|edge| prepared.own_ensembles(edge), Wish::Size(raw / ratio), &options, &quiet)?;
+        let verified = encode_verified(
+            &prepared,
+            &|edge| prepared.own_ensembles(edge),
+            Wish::Size(raw / ratio),
+            &options,
+            &quiet,
+        )?;
         row("own columns", &verified, say);
         written.push((out.join(format!("cloth-{ratio}.selv")), verified.encoded.bytes));
     }
@@ -109,11 +139,14 @@ pub fn tell(out: &Path, say: &mut dyn FnMut(String)) -> Result<Story> {
     }
 
     let (_, bytes) = &written[RATIOS.len() - 1];
-    let file = selvedge::open(bytes, &Limits::NONE).map_err(|finding| ToolError::Mismatch(finding.to_string()))?;
+    let file =
+        selvedge::open(bytes, &Limits::NONE).map_err(|finding| ToolError::Mismatch(finding.to_string()))?;
     let description = cloth.description();
     for (number, [light, view]) in [[0, 0], [21, 3], [60, 42]].into_iter().enumerate() {
-        let [decoded, reference] = [Source::File(&file, 0), Source::Data(cloth)].map(|source| measure::image(source, description, light, view));
-        let picture = beside_error(&decoded?, &reference?, description.size, cloth.statistics().log_offset(), 1.0, 1.0);
+        let [decoded, reference] = [Source::File(&file, 0), Source::Data(cloth)]
+            .map(|source| measure::image(source, description, light, view));
+        let picture =
+            beside_error(&decoded?, &reference?, description.size, cloth.statistics().log_offset(), 1.0, 1.0);
         picture.save(&out.join(format!("cloth-{number}.png")))?;
     }
     let light = glam::DVec3::new(-0.45, 0.5, 0.74).normalize();
@@ -121,7 +154,8 @@ pub fn tell(out: &Path, say: &mut dyn FnMut(String)) -> Result<Story> {
         .iter()
         .take(RATIOS.len())
         .map(|(_, bytes)| {
-            let file = selvedge::open(bytes, &Limits::NONE).map_err(|finding| ToolError::Mismatch(finding.to_string()))?;
+            let file = selvedge::open(bytes, &Limits::NONE)
+                .map_err(|finding| ToolError::Mismatch(finding.to_string()))?;
             render_ball(&file, 320, light, 1.0)
         })
         .collect::<Result<_>>()?;
@@ -135,7 +169,12 @@ layers, three levels of detail. Errors are of the file as decoded, over all texe
 <p>Decoded (1/{}), data, error (white is 1 in the natural logarithm), at three pairs of directions:</p>\
 <p><img src=\"cloth-0.png\" alt=\"cloth from above\"></p><p><img src=\"cloth-1.png\" alt=\"cloth lit from the side\"></p><p><img src=\"cloth-2.png\" alt=\"cloth at grazing angles\"></p>",
         RATIOS.map(|r| format!("1/{r}")).join(", "),
-        written.iter().take(RATIOS.len()).map(|(_, bytes)| bytes.len().to_string()).collect::<Vec<_>>().join(", "),
+        written
+            .iter()
+            .take(RATIOS.len())
+            .map(|(_, bytes)| bytes.len().to_string())
+            .collect::<Vec<_>>()
+            .join(", "),
         RATIOS[RATIOS.len() - 1],
     );
     Ok(Story { written, html })

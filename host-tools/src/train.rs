@@ -1,13 +1,16 @@
-//! Training of an ensemble of orthonormal 4-D dictionaries (SparseBTF 2023, equation 2), one time, for unseen materials.
+//! Training of an ensemble of orthonormal 4-D dictionaries (SparseBTF 2023, equation 2), one time, for unseen
+//! materials.
 //!
-//! Alternates three steps, none of which can raise the objective: each block goes to the dictionary that leaves the
-//! least error with `sparsity` coefficients; its coefficients are cut to those (hard thresholding); and each basis
-//! of each dictionary becomes the orthogonal matrix that fits the cut coefficients best (orthogonal Procrustes, by a
-//! singular value decomposition), mode by mode. Light and view bases are turned within a subspace of the leading
-//! eigenvectors over all materials (HOSVD), which divides the work by ten and more; outside of it all dictionaries
-//! share the remaining eigenvectors, so that their bases are complete.
+//! Alternates three steps, none of which can raise the objective: each block goes to the dictionary that
+//! leaves the least error with `sparsity` coefficients; its coefficients are cut to those (hard
+//! thresholding); and each basis of each dictionary becomes the orthogonal matrix that fits the cut
+//! coefficients best (orthogonal Procrustes, by a singular value decomposition), mode by mode. Light and view
+//! bases are turned within a subspace of the leading eigenvectors over all materials (HOSVD), which divides
+//! the work by ten and more; outside of it all dictionaries share the remaining eigenvectors, so that their
+//! bases are complete.
 //!
-//! Every sum is made in a fixed order: the result depends neither on the number of threads nor on interruptions.
+//! Every sum is made in a fixed order: the result depends neither on the number of threads nor on
+//! interruptions.
 
 use crate::blocks::{self, Blocks, Moments};
 use crate::dataset::Dataset;
@@ -44,7 +47,16 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Options {
-        Options { dictionaries: 8, sparsity: [256, 32, 32], edge: 10, subspace: 48, blocks: 2880, iterations: 40, tolerance: 1e-4, seed: 1 }
+        Options {
+            dictionaries: 8,
+            sparsity: [256, 32, 32],
+            edge: 10,
+            subspace: 48,
+            blocks: 2880,
+            iterations: 40,
+            tolerance: 1e-4,
+            seed: 1,
+        }
     }
 }
 
@@ -128,30 +140,43 @@ fn choose_blocks(prepared: &[Prepared<'_>], options: &Options) -> Vec<(usize, us
 
 /// Trains on datasets with equal directions.
 ///
-/// With `state` the progress of every iteration is kept in that file and continued from it; it is removed at the end.
-/// `tell` hears of each iteration and may stop the training by `false`, after which `Ok(None)` is returned.
+/// With `state` the progress of every iteration is kept in that file and continued from it; it is removed at
+/// the end. `tell` hears of each iteration and may stop the training by `false`, after which `Ok(None)` is
+/// returned.
 ///
 /// # Errors
 /// If datasets differ in their directions or cannot be read, or the state is of another training.
-pub fn train(datasets: &[&Dataset], options: &Options, state: Option<&Path>, tell: &mut dyn FnMut(Step) -> bool) -> Result<Option<Trained>> {
-    let Some(first) = datasets.first() else { return Err(ToolError::Usage("training needs a dataset".into())) };
+pub fn train(
+    datasets: &[&Dataset],
+    options: &Options,
+    state: Option<&Path>,
+    tell: &mut dyn FnMut(Step) -> bool,
+) -> Result<Option<Trained>> {
+    let Some(first) = datasets.first() else {
+        return Err(ToolError::Usage("training needs a dataset".into()));
+    };
     let (lights, views) = (first.description().lights.len(), first.description().views.len());
     for dataset in datasets {
         let other = dataset.description();
         if other.lights != first.description().lights || other.views != first.description().views {
-            return Err(ToolError::Usage(format!("{}: other directions than those of {}", dataset.path().display(), first.path().display())));
+            return Err(ToolError::Usage(format!(
+                "{}: other directions than those of {}",
+                dataset.path().display(),
+                first.path().display()
+            )));
         }
     }
     let identity = identity(datasets, options);
     let mut now = match state.filter(|path| path.exists()) {
         Some(path) => {
-            let found: State = serde_json::from_slice(&crate::files::read(path)?).map_err(|error| ToolError::Foreign {
-                path: path.to_owned(),
-                offset: 0,
-                what: error.to_string(),
+            let found: State = serde_json::from_slice(&crate::files::read(path)?).map_err(|error| {
+                ToolError::Foreign { path: path.to_owned(), offset: 0, what: error.to_string() }
             })?;
             if found.identity != identity {
-                return Err(ToolError::Usage(format!("{}: is of another training; remove it to begin anew", path.display())));
+                return Err(ToolError::Usage(format!(
+                    "{}: is of another training; remove it to begin anew",
+                    path.display()
+                )));
             }
             found
         }
@@ -159,14 +184,22 @@ pub fn train(datasets: &[&Dataset], options: &Options, state: Option<&Path>, tel
     };
     let mut prepared = Vec::new();
     for dataset in datasets {
-        prepared.push(prepare(vec![dataset], TransferModel::Log2 { offset: dataset.statistics().coded_offset() }, &|_, _| ())?);
+        prepared.push(prepare(
+            vec![dataset],
+            TransferModel::Log2 { offset: dataset.statistics().coded_offset() },
+            &|_, _| (),
+        )?);
     }
     let chosen = choose_blocks(&prepared, options);
     let subspaces = [lights, views].map(|n| options.subspace.clamp(1, n));
     while now.channel < 3 {
         let c = now.channel;
         let full = shared_bases(&prepared, c, [lights, views]);
-        let shared = Ensemble { light: full[0].first(subspaces[0]), view: full[1].first(subspaces[1]), ..Ensemble::default() };
+        let shared = Ensemble {
+            light: full[0].first(subspaces[0]),
+            view: full[1].first(subspaces[1]),
+            ..Ensemble::default()
+        };
         let set = Set::read(&prepared, &chosen, c, shared, options)?;
         if now.iteration == 0 {
             let (ensemble, assigned) = set.begin(options);
@@ -180,8 +213,11 @@ pub fn train(datasets: &[&Dataset], options: &Options, state: Option<&Path>, tel
             let objective = if set.energy > 0.0 { error / set.energy } else { 0.0 };
             let before = now.objectives[c].last().copied();
             now.objectives[c].push(objective);
-            now.members[c] = (0..ensemble.turns.len()).map(|k| now.assigned.iter().filter(|&&a| a as usize == k).count()).collect();
-            let settled = before.is_some_and(|before| before - objective < options.tolerance * before) || objective <= 0.0;
+            now.members[c] = (0..ensemble.turns.len())
+                .map(|k| now.assigned.iter().filter(|&&a| a as usize == k).count())
+                .collect();
+            let settled = before.is_some_and(|before| before - objective < options.tolerance * before)
+                || objective <= 0.0;
             let last = settled || now.iteration + 1 >= options.iterations;
             let mut revived = 0;
             if !last {
@@ -219,19 +255,32 @@ pub fn train(datasets: &[&Dataset], options: &Options, state: Option<&Path>, tel
 
 /// What makes two trainings the same.
 fn identity(datasets: &[&Dataset], options: &Options) -> String {
-    let of = |dataset: &&Dataset| serde_json::to_string(&(dataset.description(), dataset.statistics())).expect("plain data");
-    let all = serde_json::to_string(options).expect("plain data") + &datasets.iter().map(of).collect::<String>();
+    let of = |dataset: &&Dataset| {
+        serde_json::to_string(&(dataset.description(), dataset.statistics())).expect("plain data")
+    };
+    let all =
+        serde_json::to_string(options).expect("plain data") + &datasets.iter().map(of).collect::<String>();
     selvedge::sha256(all.as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 fn turns_to_bits(ensemble: &Ensemble) -> Vec<[Vec<u32>; 4]> {
-    let bits = |turn: &Turn| [turn.light.as_ref(), turn.view.as_ref(), Some(&turn.x), Some(&turn.y)].map(|basis| basis.map_or_else(Vec::new, to_bits));
+    let bits = |turn: &Turn| {
+        [turn.light.as_ref(), turn.view.as_ref(), Some(&turn.x), Some(&turn.y)]
+            .map(|basis| basis.map_or_else(Vec::new, to_bits))
+    };
     ensemble.turns.iter().map(bits).collect()
 }
 
 fn turns_from_bits(bits: &[[Vec<u32>; 4]]) -> Vec<Turn> {
     let some = |bits: &Vec<u32>| (!bits.is_empty()).then(|| from_bits(bits));
-    bits.iter().map(|[light, view, x, y]| Turn { light: some(light), view: some(view), x: from_bits(x), y: from_bits(y) }).collect()
+    bits.iter()
+        .map(|[light, view, x, y]| Turn {
+            light: some(light),
+            view: some(view),
+            x: from_bits(x),
+            y: from_bits(y),
+        })
+        .collect()
 }
 
 /// Eigenvectors between lights and between views, over all materials, each of which counts the same.
@@ -261,7 +310,13 @@ struct Set {
 const MODES: usize = 4;
 
 impl Set {
-    fn read(prepared: &[Prepared<'_>], chosen: &[(usize, usize)], channel: usize, shared: Ensemble, options: &Options) -> Result<Set> {
+    fn read(
+        prepared: &[Prepared<'_>],
+        chosen: &[(usize, usize)],
+        channel: usize,
+        shared: Ensemble,
+        options: &Options,
+    ) -> Result<Set> {
         let readers: Vec<Blocks<'_>> = prepared.iter().map(|p| p.blocks(0, options.edge)).collect();
         let work = |i: usize| -> Result<(Vec<f32>, f64)> {
             let (d, block) = chosen[i];
@@ -272,10 +327,11 @@ impl Set {
             Ok((core, planes[channel].iter().map(|&v| (v as f64).powi(2)).sum()))
         };
         let start = (Vec::with_capacity(chosen.len()), Vec::new());
-        let (cores, energies) = ordered(chosen.len(), work, start, |(cores, energies), _, (core, energy)| {
-            cores.push(core);
-            energies.push(energy);
-        })?;
+        let (cores, energies) =
+            ordered(chosen.len(), work, start, |(cores, energies), _, (core, energy)| {
+                cores.push(core);
+                energies.push(energy);
+            })?;
         let energy = energies.iter().sum();
         Ok(Set { shared, edge: options.edge, cores, energies, energy })
     }
@@ -310,7 +366,9 @@ impl Set {
                     }
                     Ok(gram.iter().map(|&g| g as f64).collect())
                 };
-                let sum = ordered(blocks.len(), work, vec![0.0; n * n], |sum, _, gram| sum.iter_mut().zip(gram).for_each(|(a, b)| *a += b));
+                let sum = ordered(blocks.len(), work, vec![0.0; n * n], |sum, _, gram| {
+                    sum.iter_mut().zip(gram).for_each(|(a, b)| *a += b)
+                });
                 eigenbasis(&sum.unwrap_or_default(), n).0
             })
             .collect();
@@ -321,12 +379,19 @@ impl Set {
     /// Clusters by where a block's energy is, and the eigenvectors of each.
     fn begin(&self, options: &Options) -> (Ensemble, Vec<u32>) {
         let features: Vec<Vec<f32>> = self.cores.iter().map(|core| self.feature(core)).collect();
-        let distance = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| ((a - b) as f64).powi(2)).sum::<f64>();
+        let distance =
+            |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| ((a - b) as f64).powi(2)).sum::<f64>();
         let count = options.dictionaries.clamp(1, self.cores.len());
         // Farthest first: each centre is the block that is worst served by those before.
         let mut centres: Vec<Vec<f32>> = Vec::new();
         let mut nearest = vec![f64::MAX; features.len()];
-        let largest = |values: &[f64]| values.iter().enumerate().fold((0, f64::MIN), |best, (i, &v)| if v > best.1 { (i, v) } else { best }).0;
+        let largest = |values: &[f64]| {
+            values
+                .iter()
+                .enumerate()
+                .fold((0, f64::MIN), |best, (i, &v)| if v > best.1 { (i, v) } else { best })
+                .0
+        };
         while centres.len() < count {
             let next = if centres.is_empty() { largest(&self.energies) } else { largest(&nearest) };
             centres.push(features[next].clone());
@@ -339,15 +404,23 @@ impl Set {
                 *assigned = largest(&distances) as u32;
             }
             for (k, centre) in centres.iter_mut().enumerate() {
-                let members: Vec<&Vec<f32>> = features.iter().zip(&assigned).filter(|(_, a)| **a as usize == k).map(|(f, _)| f).collect();
+                let members: Vec<&Vec<f32>> = features
+                    .iter()
+                    .zip(&assigned)
+                    .filter(|(_, a)| **a as usize == k)
+                    .map(|(f, _)| f)
+                    .collect();
                 if !members.is_empty() {
-                    *centre = (0..centre.len()).map(|i| members.iter().map(|f| f[i]).sum::<f32>() / members.len() as f32).collect();
+                    *centre = (0..centre.len())
+                        .map(|i| members.iter().map(|f| f[i]).sum::<f32>() / members.len() as f32)
+                        .collect();
                 }
             }
         }
         let turns = (0..count)
             .map(|k| {
-                let members: Vec<usize> = (0..assigned.len()).filter(|&i| assigned[i] as usize == k).collect();
+                let members: Vec<usize> =
+                    (0..assigned.len()).filter(|&i| assigned[i] as usize == k).collect();
                 self.eigen_turn(&members)
             })
             .collect();
@@ -369,7 +442,12 @@ impl Set {
     }
 
     /// The best dictionary of each block, its coefficients, and the errors.
-    fn assign(&self, ensemble: &Ensemble, before: &[u32], sparsity: usize) -> (Vec<Kept>, Vec<u32>, f64, Vec<f64>) {
+    fn assign(
+        &self,
+        ensemble: &Ensemble,
+        before: &[u32],
+        sparsity: usize,
+    ) -> (Vec<Kept>, Vec<u32>, f64, Vec<f64>) {
         let work = |i: usize| -> std::result::Result<(Kept, u32, f64), ()> {
             let (mut scratch, mut tensor, mut buckets) = (Scratch::default(), Vec::new(), Vec::new());
             let (mut best, mut most) = (before[i] as usize, f64::MIN);
@@ -380,8 +458,8 @@ impl Set {
                     (best, most) = (k, energy);
                 }
             }
-            // Energies by buckets are near; between the new dictionary and the old the exact ones decide, so that the
-            // objective cannot rise.
+            // Energies by buckets are near; between the new dictionary and the old the exact ones decide, so
+            // that the objective cannot rise.
             let mut exact = |k: usize| {
                 ensemble.to_coefficients(k, &self.cores[i], &mut scratch, &mut tensor);
                 let (limit, _) = magnitude_of_rank(&tensor, sparsity, &mut buckets);
@@ -397,12 +475,13 @@ impl Set {
             Ok((kept, best as u32, (self.energies[i] - energy).max(0.0)))
         };
         let start = (Vec::new(), Vec::new(), 0.0, Vec::new());
-        let done = ordered(self.cores.len(), work, start, |(kept, assigned, total, errors), _, (list, k, error)| {
-            kept.push(list);
-            assigned.push(k);
-            *total += error;
-            errors.push(error);
-        });
+        let done =
+            ordered(self.cores.len(), work, start, |(kept, assigned, total, errors), _, (list, k, error)| {
+                kept.push(list);
+                assigned.push(k);
+                *total += error;
+                errors.push(error);
+            });
         done.unwrap_or_default()
     }
 
@@ -477,7 +556,8 @@ impl Set {
 
 /// The largest coefficients, at most `count`, among those of at least `limit`; and their energy.
 fn largest(tensor: &[f32], limit: f32, count: usize) -> (Kept, f64) {
-    let mut list: Kept = (0u32..).zip(tensor).filter(|(_, v)| v.abs() >= limit && **v != 0.0).map(|(i, &v)| (i, v)).collect();
+    let mut list: Kept =
+        (0u32..).zip(tensor).filter(|(_, v)| v.abs() >= limit && **v != 0.0).map(|(i, &v)| (i, v)).collect();
     list.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()).then(a.0.cmp(&b.0)));
     list.truncate(count);
     let energy = list.iter().map(|(_, v)| (*v as f64).powi(2)).sum();

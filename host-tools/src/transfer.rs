@@ -1,8 +1,8 @@
 //! From radiance to the channels that are coded, in floats: the encoder's side of chapter 7.
 //!
-//! Channels are an orthonormal mixture of red, green and blue (or of their logarithms). Because the mixture is
-//! orthonormal, an error of the channels is an error of the colours of equal size, so that what is spent on one
-//! channel can be weighed against what is saved in another.
+//! Channels are an orthonormal mixture of red, green and blue (or of their logarithms). Because the mixture
+//! is orthonormal, an error of the channels is an error of the colours of equal size, so that what is spent
+//! on one channel can be weighed against what is saved in another.
 
 use crate::model::TransferModel;
 
@@ -50,8 +50,13 @@ impl Forward {
     pub fn new(transfer: TransferModel) -> Forward {
         let q = matrix_q13().map(|m| m as f64 / 8192.0);
         let matrix = glam::DMat3::from_cols_array(&q).transpose().inverse();
-        let scale = if let TransferModel::Linear { exponent } = transfer { (-exponent as f32).exp2() } else { 1.0 };
-        Forward { transfer, scale, from_rgb: std::array::from_fn(|r| std::array::from_fn(|c| matrix.row(r)[c] as f32)) }
+        let scale =
+            if let TransferModel::Linear { exponent } = transfer { (-exponent as f32).exp2() } else { 1.0 };
+        Forward {
+            transfer,
+            scale,
+            from_rgb: std::array::from_fn(|r| std::array::from_fn(|c| matrix.row(r)[c] as f32)),
+        }
     }
 
     /// The mixture alone: channels of values that are logarithms of base two, or radiances, already.
@@ -79,7 +84,10 @@ mod tests {
     fn logarithms_are_exact_enough_everywhere() {
         for i in 1..200_000u32 {
             let x = f32::from_bits(0x0080_0000 + i * 10_000);
-            assert!((log2(x) as f64 - (x as f64).log2()).abs() < 3e-7 * (x as f64).log2().abs().max(1.0), "{x}");
+            assert!(
+                (log2(x) as f64 - (x as f64).log2()).abs() < 3e-7 * (x as f64).log2().abs().max(1.0),
+                "{x}"
+            );
         }
         assert_eq!(log2(1.0), 0.0);
         assert_eq!(log2(8.0), 3.0);
@@ -95,7 +103,9 @@ mod tests {
                 let m = matrix_q13().map(i32::from);
                 for c in 0..3 {
                     let values = selvedge::Values { c0: q20[0], c1: q20[1], c2: q20[2] };
-                    let row = selvedge::colour::matrix_row(m[3 * c], m[3 * c + 1], m[3 * c + 2], values) as f64 / 1_048_576.0;
+                    let row = selvedge::colour::matrix_row(m[3 * c], m[3 * c + 1], m[3 * c + 2], values)
+                        as f64
+                        / 1_048_576.0;
                     let back = match transfer {
                         TransferModel::Log2 { offset } => row.exp2() - offset as f64,
                         TransferModel::Linear { exponent } => row * (exponent as f64).exp2(),

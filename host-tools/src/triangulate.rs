@@ -12,7 +12,8 @@ use std::collections::BTreeMap;
 pub struct Triangulation {
     /// Counter-clockwise, lowest direction first, ascending.
     pub triangles: Vec<[u32; 3]>,
-    /// The closed hull from its lowest direction; for collinear points along the line from the lowest x, then y, and back.
+    /// The closed hull from its lowest direction; for collinear points along the line from the lowest x,
+    /// then y, and back.
     pub hull: Vec<u32>,
     /// Cells along an axis.
     pub grid_size: u32,
@@ -52,18 +53,29 @@ pub fn triangulate(points: &[[i32; 2]], grid_size: Option<u32>) -> Triangulation
     let mut triangles = delaunay(points);
     triangles.sort_unstable();
     let hull = if triangles.is_empty() { line_hull(points) } else { convex_hull(&triangles) };
-    let grid_size = grid_size.unwrap_or_else(|| ((triangles.len() as f64 * 2.0).sqrt().ceil() as u32).clamp(1, 64));
+    let grid_size =
+        grid_size.unwrap_or_else(|| ((triangles.len() as f64 * 2.0).sqrt().ceil() as u32).clamp(1, 64));
     with_grid(points, triangles, hull, grid_size)
 }
 
 /// Triangles and hull as they are, with the grid that lists where they meet its cells (5.5).
-pub fn with_grid(points: &[[i32; 2]], triangles: Vec<[u32; 3]>, hull: Vec<u32>, grid_size: u32) -> Triangulation {
+pub fn with_grid(
+    points: &[[i32; 2]],
+    triangles: Vec<[u32; 3]>,
+    hull: Vec<u32>,
+    grid_size: u32,
+) -> Triangulation {
     let mut starts = vec![0];
     let mut candidates = Vec::new();
     for cell_y in 0..grid_size {
         for cell_x in 0..grid_size {
             let (x, y) = (cell_range(cell_x, grid_size), cell_range(cell_y, grid_size));
-            candidates.extend((0u32..).zip(&triangles).filter(|(_, t)| meets_cell(t.map(|i| points[i as usize].into()), x, y)).map(|(i, _)| i));
+            candidates.extend(
+                (0u32..)
+                    .zip(&triangles)
+                    .filter(|(_, t)| meets_cell(t.map(|i| points[i as usize].into()), x, y))
+                    .map(|(i, _)| i),
+            );
             starts.push(candidates.len() as u32);
         }
     }
@@ -72,8 +84,10 @@ pub fn with_grid(points: &[[i32; 2]], triangles: Vec<[u32; 3]>, hull: Vec<u32>, 
 
 fn delaunay(points: &[[i32; 2]]) -> Vec<[u32; 3]> {
     let vertices = points.iter().map(|p| Point2::new(p[0] as f64, p[1] as f64)).collect();
-    let triangulation = DelaunayTriangulation::<Point2<f64>>::bulk_load_stable(vertices).expect("points are finite and small");
-    let faces: Vec<[u32; 3]> = triangulation.inner_faces().map(|face| face.vertices().map(|v| v.fix().index() as u32)).collect();
+    let triangulation = DelaunayTriangulation::<Point2<f64>>::bulk_load_stable(vertices)
+        .expect("points are finite and small");
+    let faces: Vec<[u32; 3]> =
+        triangulation.inner_faces().map(|face| face.vertices().map(|v| v.fix().index() as u32)).collect();
     let mut side_of = BTreeMap::new();
     for (f, t) in faces.iter().enumerate() {
         for i in 0..3 {
@@ -113,7 +127,8 @@ fn delaunay(points: &[[i32; 2]]) -> Vec<[u32; 3]> {
 
 /// Sides without a neighbour, in order, from the lowest direction.
 fn convex_hull(triangles: &[[u32; 3]]) -> Vec<u32> {
-    let sides: Vec<(u32, u32)> = triangles.iter().flat_map(|t| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])]).collect();
+    let sides: Vec<(u32, u32)> =
+        triangles.iter().flat_map(|t| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])]).collect();
     let all: std::collections::BTreeSet<_> = sides.iter().copied().collect();
     let next: BTreeMap<u32, u32> = sides.into_iter().filter(|&(a, b)| !all.contains(&(b, a))).collect();
     let first = *next.keys().next().expect("a triangulation has a hull");

@@ -8,9 +8,9 @@
 //! - *channels*: the value of every channel that keeps its texture. A channel that keeps its mean has the
 //!   value that a channel of state 1 has, and one that keeps nothing has 0. Radiance is the original's if
 //!   every channel keeps what it has, or what goes has only zeros in its column of the colour matrix;
-//! - *directions*: filtered and texel samples whose light and view lie in their sectors ([`Sector::contains`]),
-//!   and point samples of kept directions, under the new number: the place in [`kept_directions`]. Other
-//!   queries are answered too, from what is left;
+//! - *directions*: filtered and texel samples whose light and view lie in their sectors
+//!   ([`Sector::contains`]), and point samples of kept directions, under the new number: the place in
+//!   [`kept_directions`]. Other queries are answered too, from what is left;
 //! - *unused*: every query.
 //!
 //! The promise is for models as the writer triangulates them. The result has its factors in itself, whether
@@ -18,7 +18,9 @@
 //! and checksums are the writer's.
 
 use crate::error::{Result, ToolError};
-use crate::model::{AtomModel, ChannelModel, EnsembleModel, FactorModel, MaterialModel, PairTableModel, TensorModel};
+use crate::model::{
+    AtomModel, ChannelModel, EnsembleModel, FactorModel, MaterialModel, PairTableModel, TensorModel,
+};
 use crate::sector::{Sector, kept_directions};
 use selvedge::tensor::bit_length;
 
@@ -57,7 +59,9 @@ pub struct Trim {
 /// [`ToolError::Usage`] for layers or levels that the model does not have, and for angles that are none.
 pub fn trim(model: &MaterialModel, options: &Trim) -> Result<MaterialModel> {
     let count = |name: &str, asked: Option<u32>, there: u32| match asked {
-        Some(asked) if !(1..=there).contains(&asked) => Err(ToolError::Usage(format!("the file has {there} {name}: keep 1 to {there}, not {asked}"))),
+        Some(asked) if !(1..=there).contains(&asked) => {
+            Err(ToolError::Usage(format!("the file has {there} {name}: keep 1 to {there}, not {asked}")))
+        }
         asked => Ok(asked.unwrap_or(there)),
     };
     let layers = count("layers", options.layers, model.layer_count)?;
@@ -79,7 +83,8 @@ pub fn trim(model: &MaterialModel, options: &Trim) -> Result<MaterialModel> {
         }
     }
     if let Some(tensor) = &mut left.tensor {
-        let keeps: [bool; 3] = std::array::from_fn(|c| tensor.channels[c] && options.channels[c] == Keep::Texture);
+        let keeps: [bool; 3] =
+            std::array::from_fn(|c| tensor.channels[c] && options.channels[c] == Keep::Texture);
         keep_channels(tensor, keeps);
         tensor.lists.truncate(levels as usize);
         tensor.lists.iter_mut().for_each(|level| level.truncate(layers as usize));
@@ -100,23 +105,38 @@ fn keep_directions(model: &mut MaterialModel, options: &Trim) {
     };
     let (lights, views) = (kept(&model.lights, &options.lights), kept(model.views(), &options.views));
     let light_count = model.lights.len();
-    let chosen = |points: &[[i32; 2]], kept: &[u32]| kept.iter().map(|&i| points[i as usize]).collect::<Vec<_>>();
+    let chosen =
+        |points: &[[i32; 2]], kept: &[u32]| kept.iter().map(|&i| points[i as usize]).collect::<Vec<_>>();
     // One set for both stays one set as long as both keep the same of it.
     let new_views = (model.views.is_some() || lights != views).then(|| chosen(model.views(), &views));
     model.lights = chosen(&model.lights, &lights);
     model.views = new_views;
     let table = |table: &mut PairTableModel| {
         let entry = |view: u32, light: u32| table.entries[view as usize * light_count + light as usize];
-        table.entries = views.iter().flat_map(|&view| lights.iter().map(move |&light| entry(view, light))).collect();
+        table.entries =
+            views.iter().flat_map(|&view| lights.iter().map(move |&light| entry(view, light))).collect();
     };
     let rows = |factor: &mut FactorModel, kept: &[u32]| {
         let columns = factor.columns as usize;
-        factor.entries = kept.iter().flat_map(|&row| &factor.entries[row as usize * columns..][..columns]).copied().collect();
+        factor.entries = kept
+            .iter()
+            .flat_map(|&row| &factor.entries[row as usize * columns..][..columns])
+            .copied()
+            .collect();
     };
     if let Some(tensor) = &mut model.tensor {
-        let (light_row, view_row) = (tensor.light_atoms as usize, tensor.atoms.len() * tensor.entries as usize);
-        tensor.lights = lights.iter().flat_map(|&light| &tensor.lights[light as usize * light_row..][..light_row]).copied().collect();
-        tensor.fibres = views.iter().flat_map(|&view| &tensor.fibres[view as usize * view_row..][..view_row]).copied().collect();
+        let (light_row, view_row) =
+            (tensor.light_atoms as usize, tensor.atoms.len() * tensor.entries as usize);
+        tensor.lights = lights
+            .iter()
+            .flat_map(|&light| &tensor.lights[light as usize * light_row..][..light_row])
+            .copied()
+            .collect();
+        tensor.fibres = views
+            .iter()
+            .flat_map(|&view| &tensor.fibres[view as usize * view_row..][..view_row])
+            .copied()
+            .collect();
     }
     for channel in &mut model.channels {
         channel.mean.iter_mut().chain(&mut channel.scale).for_each(table);
@@ -161,17 +181,28 @@ pub fn drop_unused(ensemble: &mut EnsembleModel) {
     let records = || ensemble.coefficients.iter().flatten().flat_map(|coefficients| &coefficients.records);
     for record in records().filter(|record| !record.coefficients.is_empty()) {
         dictionary_used[record.dictionary as usize] = true;
-        record.coefficients.iter().for_each(|&(position, _)| used[record.dictionary as usize][position as usize] = true);
+        record
+            .coefficients
+            .iter()
+            .for_each(|&(position, _)| used[record.dictionary as usize][position as usize] = true);
     }
     let positions: Vec<Renumbering> = used.iter().map(|used| Renumbering::new(used, false)).collect();
     let numbers = Renumbering::new(&dictionary_used, true);
-    for record in ensemble.coefficients.iter_mut().flatten().flat_map(|coefficients| &mut coefficients.records) {
+    for record in
+        ensemble.coefficients.iter_mut().flatten().flat_map(|coefficients| &mut coefficients.records)
+    {
         let of_k = &positions[record.dictionary as usize];
         record.coefficients.iter_mut().for_each(|(position, _)| *position = of_k.new[*position as usize]);
-        record.dictionary = if record.coefficients.is_empty() { 0 } else { numbers.new[record.dictionary as usize] };
+        record.dictionary =
+            if record.coefficients.is_empty() { 0 } else { numbers.new[record.dictionary as usize] };
     }
     let kept = |k: &u32| *k as usize;
-    ensemble.atoms = numbers.kept.iter().map(kept).map(|k| positions[k].kept.iter().map(|&i| ensemble.atoms[k][i as usize]).collect()).collect();
+    ensemble.atoms = numbers
+        .kept
+        .iter()
+        .map(kept)
+        .map(|k| positions[k].kept.iter().map(|&i| ensemble.atoms[k][i as usize]).collect())
+        .collect();
     ensemble.dictionaries = numbers.kept.iter().map(kept).map(|k| ensemble.dictionaries[k].clone()).collect();
     for (dictionary, atoms) in ensemble.dictionaries.iter_mut().zip(&mut ensemble.atoms) {
         drop_columns(&mut dictionary.light, atoms, |atom| &mut atom.light);
@@ -197,19 +228,32 @@ fn keep_channels(tensor: &mut TensorModel, keeps: [bool; 3]) {
 /// What stays keeps its order and its values, so that every sum is formed as before.
 fn drop_unused_of_tensor(tensor: &mut TensorModel) {
     let mut used = vec![false; tensor.atoms.len()];
-    tensor.lists.iter().flatten().flat_map(|layer| &layer.lists).flatten().for_each(|&(atom, _)| used[atom as usize] = true);
+    tensor
+        .lists
+        .iter()
+        .flatten()
+        .flat_map(|layer| &layer.lists)
+        .flatten()
+        .for_each(|&(atom, _)| used[atom as usize] = true);
     let atoms = Renumbering::new(&used, true);
     for (atom, _) in tensor.lists.iter_mut().flatten().flat_map(|layer| &mut layer.lists).flatten() {
         *atom = atoms.new[*atom as usize];
     }
     let (row, entries) = (tensor.atoms.len() * tensor.entries as usize, tensor.entries as usize);
     let fibres = tensor.fibres.chunks(row);
-    tensor.fibres = fibres.flat_map(|row| atoms.kept.iter().flat_map(|&atom| &row[atom as usize * entries..][..entries])).copied().collect();
+    tensor.fibres = fibres
+        .flat_map(|row| atoms.kept.iter().flat_map(|&atom| &row[atom as usize * entries..][..entries]))
+        .copied()
+        .collect();
     tensor.atoms = atoms.kept.iter().map(|&atom| tensor.atoms[atom as usize]).collect();
 
     let mask = (1u16 << bit_length(tensor.light_atoms - 1)).wrapping_sub(1);
     let mut used = vec![false; tensor.light_atoms as usize];
-    tensor.fibres.iter().filter(|&&entry| entry & !mask != 0).for_each(|&entry| used[(entry & mask) as usize] = true);
+    tensor
+        .fibres
+        .iter()
+        .filter(|&&entry| entry & !mask != 0)
+        .for_each(|&entry| used[(entry & mask) as usize] = true);
     let light = Renumbering::new(&used, true);
     // With fewer bits for the number the bits that a value gains are zero, as they were in effect.
     for entry in &mut tensor.fibres {

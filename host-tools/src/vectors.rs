@@ -1,7 +1,8 @@
 //! The conformance suite: readable recipes become files, and files are held against what their recipes state.
 //!
-//! A recipe names a base, changes to its model by JSON pointer, and changes to its bytes by place; an invalid one states the
-//! rule that is broken, where, and what is found there (1.4-4). What is stated comes from the recipe alone, never from a decoder.
+//! A recipe names a base, changes to its model by JSON pointer, and changes to its bytes by place; an invalid
+//! one states the rule that is broken, where, and what is found there (1.4-4). What is stated comes from the
+//! recipe alone, never from a decoder.
 
 use crate::error::{Result, ToolError};
 use crate::example::{example_model, tensor_example_model};
@@ -11,7 +12,8 @@ use crate::inspect::hex;
 use crate::model::MaterialModel;
 use crate::triangulate::{triangulate, with_grid};
 use crate::write::{
-    Part, directions_part, lay_out, repair_checksums, repair_header_checksum, take_apart, words_to_bytes, write_dictionary, write_material, write_split,
+    Part, directions_part, lay_out, repair_checksums, repair_header_checksum, take_apart, words_to_bytes,
+    write_dictionary, write_material, write_split,
 };
 use selvedge::Limits;
 use serde::Deserialize;
@@ -134,7 +136,13 @@ enum Edit {
     /// A new section.
     Add { add: String, words: Vec<Number> },
     /// A set of directions with triangles, hull and grid as given, or triangulated with a grid of this size.
-    Directions { directions: u32, points: Vec<[i32; 2]>, triangles: Option<Vec<[u32; 3]>>, hull: Option<Vec<u32>>, grid: u32 },
+    Directions {
+        directions: u32,
+        points: Vec<[i32; 2]>,
+        triangles: Option<Vec<[u32; 3]>>,
+        hull: Option<Vec<u32>>,
+        grid: u32,
+    },
     /// Digest and length of the external dictionary become those of a vector.
     Reference { reference: String },
 }
@@ -182,7 +190,8 @@ pub struct Vector {
     pub dictionary: Option<String>,
     /// Limits of the caller: bytes, operations, texels.
     pub limits: Option<[u32; 3]>,
-    /// What is expected; of a valid material as the suite's manifest states it, or as this decoder answers while it is made.
+    /// What is expected; of a valid material as the suite's manifest states it, or as this decoder answers
+    /// while it is made.
     pub answer: Answer,
 }
 
@@ -212,7 +221,10 @@ fn place(file: &[u8], text: &str) -> Result<usize> {
     let (kind, instance) = section_key(section)?;
     let word = |at: usize| file.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     let count = word(24).unwrap_or(0) as usize;
-    let entry = (0..count.min(4096)).map(|i| 128 + i * 16).find(|&e| word(e) == Some(kind | instance << 16)).ok_or_else(bad)?;
+    let entry = (0..count.min(4096))
+        .map(|i| 128 + i * 16)
+        .find(|&e| word(e) == Some(kind | instance << 16))
+        .ok_or_else(bad)?;
     match what {
         "entry" => Ok(entry + add),
         "section" => Ok(word(entry + 4).ok_or_else(bad)? as usize + add),
@@ -222,8 +234,12 @@ fn place(file: &[u8], text: &str) -> Result<usize> {
 
 /// Kind and instance of `0113.0000`.
 fn section_key(text: &str) -> Result<(u32, u32)> {
-    let parts = text.split_once('.').map(|(kind, instance)| (u32::from_str_radix(kind, 16), u32::from_str_radix(instance, 16)));
-    let Some((Ok(kind), Ok(instance))) = parts else { return Err(ToolError::Usage(format!("`{text}` is no section"))) };
+    let parts = text
+        .split_once('.')
+        .map(|(kind, instance)| (u32::from_str_radix(kind, 16), u32::from_str_radix(instance, 16)));
+    let Some((Ok(kind), Ok(instance))) = parts else {
+        return Err(ToolError::Usage(format!("`{text}` is no section")));
+    };
     Ok((kind, instance))
 }
 
@@ -266,15 +282,27 @@ impl Edit {
                 let left = bytes.len().checked_sub(*drop).ok_or_else(outside)?;
                 bytes.truncate(left);
             }
-            Edit::Rotate { section, rotate: [from, to, by] } => section_of(file, section)?.get_mut(*from..*to).ok_or_else(outside)?.rotate_left(*by),
-            Edit::Byte { section, byte, to } => *section_of(file, section)?.get_mut(*byte).ok_or_else(outside)? = *to,
+            Edit::Rotate { section, rotate: [from, to, by] } => {
+                section_of(file, section)?.get_mut(*from..*to).ok_or_else(outside)?.rotate_left(*by)
+            }
+            Edit::Byte { section, byte, to } => {
+                *section_of(file, section)?.get_mut(*byte).ok_or_else(outside)? = *to
+            }
             Edit::Directions { directions, points, triangles, hull, grid } => {
                 let own = triangulate(points, None);
-                let t = with_grid(points, triangles.clone().unwrap_or(own.triangles), hull.clone().unwrap_or(own.hull), *grid);
-                *section_of(file, &format!("0003.{directions:04x}"))? = directions_part(*directions, points, &t).bytes;
+                let t = with_grid(
+                    points,
+                    triangles.clone().unwrap_or(own.triangles),
+                    hull.clone().unwrap_or(own.hull),
+                    *grid,
+                );
+                *section_of(file, &format!("0003.{directions:04x}"))? =
+                    directions_part(*directions, points, &t).bytes;
             }
             Edit::Reference { reference } => {
-                let other = made.get(reference).ok_or_else(|| ToolError::Usage(format!("{reference}: no recipe before this one has the name")))?;
+                let other = made.get(reference).ok_or_else(|| {
+                    ToolError::Usage(format!("{reference}: no recipe before this one has the name"))
+                })?;
                 let words = words_to_bytes(&[other.bytes.len() as u32, 0, 0, 0]);
                 *section_of(file, "0002.0000")? = [&selvedge::sha256(&other.bytes)[..], &words].concat();
             }
@@ -332,9 +360,16 @@ fn model_of(recipe: &Recipe, models: &BTreeMap<String, MaterialModel>) -> Result
     let base = match recipe.base.split_once(' ') {
         _ if recipe.base == "example" => example_model(),
         _ if recipe.base == "tensor example" => tensor_example_model(),
-        Some(("extreme-tensor", seed)) => extreme_tensor(seed.parse().map_err(|_| wrong(format!("`{seed}` is no seed")))?),
-        Some(("extreme", seed)) => extreme_model(seed.parse().map_err(|_| wrong(format!("`{seed}` is no seed")))?),
-        _ => models.get(&recipe.base).cloned().ok_or_else(|| wrong(format!("no recipe before this one is `{}`", recipe.base)))?,
+        Some(("extreme-tensor", seed)) => {
+            extreme_tensor(seed.parse().map_err(|_| wrong(format!("`{seed}` is no seed")))?)
+        }
+        Some(("extreme", seed)) => {
+            extreme_model(seed.parse().map_err(|_| wrong(format!("`{seed}` is no seed")))?)
+        }
+        _ => models
+            .get(&recipe.base)
+            .cloned()
+            .ok_or_else(|| wrong(format!("no recipe before this one is `{}`", recipe.base)))?,
     };
     if recipe.change.is_empty() {
         return Ok(base);
@@ -377,18 +412,24 @@ pub fn answer(bytes: &[u8], dictionary: Option<&[u8]>, limits: &Limits) -> Answe
 /// If a recipe cannot be read or carried out.
 pub fn make(folder: &Path) -> Result<Vec<Vector>> {
     let recipes = folder.join("recipes");
-    let mut paths: Vec<PathBuf> =
-        std::fs::read_dir(&recipes).map_err(ToolError::io(&recipes))?.filter_map(|entry| entry.ok().map(|entry| entry.path())).collect();
+    let mut paths: Vec<PathBuf> = std::fs::read_dir(&recipes)
+        .map_err(ToolError::io(&recipes))?
+        .filter_map(|entry| entry.ok().map(|entry| entry.path()))
+        .collect();
     paths.retain(|path| path.extension().is_some_and(|ending| ending == "json"));
     paths.sort();
     let (mut made, mut models, mut order) = (BTreeMap::new(), BTreeMap::new(), Vec::new());
     for path in paths {
         let text = files::read(&path)?;
-        let chapter: Chapter = serde_json::from_slice(&text).map_err(|error| ToolError::Usage(format!("{}: {error}", path.display())))?;
+        let chapter: Chapter = serde_json::from_slice(&text)
+            .map_err(|error| ToolError::Usage(format!("{}: {error}", path.display())))?;
         let of = |kind: &'static str| move |recipe| (kind, recipe);
-        for (kind, recipe) in chapter.valid.into_iter().map(of("valid")).chain(chapter.invalid.into_iter().map(of("invalid"))) {
+        for (kind, recipe) in
+            chapter.valid.into_iter().map(of("valid")).chain(chapter.invalid.into_iter().map(of("invalid")))
+        {
             let model = model_of(&recipe, &models)?;
-            let vector = make_one(kind, &recipe, &model, &made).map_err(|error| ToolError::Usage(format!("{}: {error}", recipe.name)))?;
+            let vector = make_one(kind, &recipe, &model, &made)
+                .map_err(|error| ToolError::Usage(format!("{}: {error}", recipe.name)))?;
             if kind == "valid" {
                 models.insert(recipe.name.clone(), model);
             }
@@ -401,7 +442,12 @@ pub fn make(folder: &Path) -> Result<Vec<Vector>> {
     Ok(order.into_iter().filter_map(|name| made.remove(&name)).collect())
 }
 
-fn make_one(kind: &str, recipe: &Recipe, model: &MaterialModel, made: &BTreeMap<String, Vector>) -> Result<Vector> {
+fn make_one(
+    kind: &str,
+    recipe: &Recipe,
+    model: &MaterialModel,
+    made: &BTreeMap<String, Vector>,
+) -> Result<Vector> {
     let mut bytes = match recipe.part {
         FilePart::Whole => write_material(model),
         FilePart::Material => write_split(model).0,
@@ -420,21 +466,38 @@ fn make_one(kind: &str, recipe: &Recipe, model: &MaterialModel, made: &BTreeMap<
         Checksums::Header => repair_header_checksum(&mut bytes),
         _ => {}
     }
-    let dictionary = recipe.dictionary.as_ref().map(|name| made.get(name).ok_or_else(|| ToolError::Usage(format!("no recipe before it is {name}"))));
+    let dictionary = recipe
+        .dictionary
+        .as_ref()
+        .map(|name| made.get(name).ok_or_else(|| ToolError::Usage(format!("no recipe before it is {name}"))));
     let dictionary = dictionary.transpose()?;
     let path = format!("{kind}/{}.selv", recipe.name);
-    let mut vector =
-        Vector { path, note: recipe.note.clone(), bytes, dictionary: dictionary.map(|d| d.path.clone()), limits: recipe.limits, answer: Answer::Legal };
+    let mut vector = Vector {
+        path,
+        note: recipe.note.clone(),
+        bytes,
+        dictionary: dictionary.map(|d| d.path.clone()),
+        limits: recipe.limits,
+        answer: Answer::Legal,
+    };
     vector.answer = match (&recipe.expect, kind) {
         (Some(expect), "invalid") => {
             let of_dictionary = matches!(expect.part, ExpectPart::Dictionary);
             let looked_at = if of_dictionary { dictionary.map_or(&[][..], |d| &d.bytes) } else { &whole };
             let part = if of_dictionary { "dictionary" } else { "file" };
-            Answer::Broken(expect.rule.clone(), part.into(), place(looked_at, &expect.at)? as u32, expect.found.get()?)
+            Answer::Broken(
+                expect.rule.clone(),
+                part.into(),
+                place(looked_at, &expect.at)? as u32,
+                expect.found.get()?,
+            )
         }
         (None, "valid") => match answer(&vector.bytes, dictionary.map(|d| &d.bytes[..]), &vector.limits()) {
             Answer::Broken(rule, part, at, found) => {
-                return Err(ToolError::Mismatch(format!("{}: a valid file, which breaks {rule} at byte {at} of the {part} (found {found})", vector.path)));
+                return Err(ToolError::Mismatch(format!(
+                    "{}: a valid file, which breaks {rule} at byte {at} of the {part} (found {found})",
+                    vector.path
+                )));
             }
             answer => answer,
         },
@@ -445,15 +508,22 @@ fn make_one(kind: &str, recipe: &Recipe, model: &MaterialModel, made: &BTreeMap<
 
 /// The list of a suite: a line a vector, columns parted by tabs.
 pub fn manifest(vectors: &[Vector]) -> String {
-    let mut text =
-        String::from("# valid\tfile\tdictionary\tdecode digest\n# invalid\tfile\tdictionary\tlimits: bytes,operations,texels\trule\tpart\toffset\tfound\n");
+    let mut text = String::from(
+        "# valid\tfile\tdictionary\tdecode digest\n# invalid\tfile\tdictionary\tlimits: bytes,operations,texels\trule\tpart\toffset\tfound\n",
+    );
     for v in vectors {
         let dictionary = v.dictionary.as_deref().unwrap_or("-");
-        let limits = v.limits.map_or("-".into(), |[bytes, operations, texels]| format!("{bytes},{operations},{texels}"));
+        let limits = v
+            .limits
+            .map_or("-".into(), |[bytes, operations, texels]| format!("{bytes},{operations},{texels}"));
         let _ = match &v.answer {
             Answer::Digest(digest) => writeln!(text, "valid\t{}\t{dictionary}\t{digest}", v.path),
             Answer::Legal => writeln!(text, "valid\t{}\t{dictionary}\t-", v.path),
-            Answer::Broken(rule, part, offset, found) => writeln!(text, "invalid\t{}\t{dictionary}\t{limits}\t{rule}\t{part}\t{offset}\t{found}", v.path),
+            Answer::Broken(rule, part, offset, found) => writeln!(
+                text,
+                "invalid\t{}\t{dictionary}\t{limits}\t{rule}\t{part}\t{offset}\t{found}",
+                v.path
+            ),
         };
     }
     text
@@ -468,21 +538,39 @@ pub fn read(folder: &Path) -> Result<Vec<Vector>> {
     let bytes = files::read(&path)?;
     let text = String::from_utf8_lossy(&bytes).into_owned();
     let mut vectors = Vec::new();
-    for (number, line) in text.lines().enumerate().filter(|(_, line)| !line.starts_with('#') && !line.is_empty()) {
+    for (number, line) in
+        text.lines().enumerate().filter(|(_, line)| !line.starts_with('#') && !line.is_empty())
+    {
         let wrong = || ToolError::Usage(format!("{}: line {} is not understood", path.display(), number + 1));
         let columns: Vec<&str> = line.split('\t').collect();
         let optional = |text: &str| (text != "-").then(|| text.to_owned());
         let (file, dictionary, limits, answer) = match columns.as_slice() {
-            ["valid", file, dictionary, digest] => (*file, optional(dictionary), None, optional(digest).map_or(Answer::Legal, Answer::Digest)),
+            ["valid", file, dictionary, digest] => {
+                (*file, optional(dictionary), None, optional(digest).map_or(Answer::Legal, Answer::Digest))
+            }
             ["invalid", file, dictionary, limits, rule, part, offset, found] => {
                 let number = |text: &str| text.parse::<u32>().map_err(|_| wrong());
-                let limits = optional(limits).map(|text| text.split(',').map(number).collect::<Result<Vec<u32>>>()).transpose()?;
+                let limits = optional(limits)
+                    .map(|text| text.split(',').map(number).collect::<Result<Vec<u32>>>())
+                    .transpose()?;
                 let limits = limits.map(|l| <[u32; 3]>::try_from(l).map_err(|_| wrong())).transpose()?;
-                (*file, optional(dictionary), limits, Answer::Broken((*rule).into(), (*part).into(), number(offset)?, number(found)?))
+                (
+                    *file,
+                    optional(dictionary),
+                    limits,
+                    Answer::Broken((*rule).into(), (*part).into(), number(offset)?, number(found)?),
+                )
             }
             _ => return Err(wrong()),
         };
-        vectors.push(Vector { path: file.into(), note: String::new(), bytes: files::read(&folder.join(file))?, dictionary, limits, answer });
+        vectors.push(Vector {
+            path: file.into(),
+            note: String::new(),
+            bytes: files::read(&folder.join(file))?,
+            dictionary,
+            limits,
+            answer,
+        });
     }
     Ok(vectors)
 }

@@ -1,11 +1,17 @@
 //! The writer: a model becomes the bytes of a file, laid out by chapter 3. One model gives one file.
 
-use crate::model::{CoefficientsModel, EnsembleModel, FactorModel, ListsModel, MaterialModel, MetadataModel, PairTableModel, TensorModel, TransferModel};
+use crate::model::{
+    CoefficientsModel, EnsembleModel, FactorModel, ListsModel, MaterialModel, MetadataModel, PairTableModel,
+    TensorModel, TransferModel,
+};
 use crate::triangulate::{Triangulation, triangulate};
 use selvedge::cost::{Shape, filtered_operations, layer_operations, record_operations};
 use selvedge::direction::{cross, dot_product};
 use selvedge::direction_set::{cosine_of, reciprocal_of};
-use selvedge::directory::{ANGULAR, ATOMS, COEFFICIENTS, DIRECTIONS, EXTERNAL, FIBRES, LIGHT_ATOMS, LISTS, MEANS, METADATA, SCALES, SPATIAL};
+use selvedge::directory::{
+    ANGULAR, ATOMS, COEFFICIENTS, DIRECTIONS, EXTERNAL, FIBRES, LIGHT_ATOMS, LISTS, MEANS, METADATA, SCALES,
+    SPATIAL,
+};
 use selvedge::ensemble::{LOW_BITS_BITS, SHIFT_BITS};
 use selvedge::ensemble_set::LOW_BITS_LIMIT;
 use selvedge::header::{CONTENT_DICTIONARY, CONTENT_MATERIAL, HEADER_LENGTH, MAGIC};
@@ -29,7 +35,11 @@ pub fn take_apart(file: &[u8]) -> ([u32; 32], Vec<Part>) {
     let entry = |i: usize| {
         let at = 128 + i * 16;
         let (offset, length) = (word(at + 4) as usize, word(at + 8) as usize);
-        Part { kind: word(at) & 0xffff, instance: word(at) >> 16, bytes: file[offset..offset + length].to_vec() }
+        Part {
+            kind: word(at) & 0xffff,
+            instance: word(at) >> 16,
+            bytes: file[offset..offset + length].to_vec(),
+        }
     };
     (std::array::from_fn(|i| word(i * 4)), (0..word(24) as usize).map(entry).collect())
 }
@@ -42,7 +52,10 @@ pub fn words_to_bytes(words: &[u32]) -> Vec<u8> {
 /// 16-bit numbers two to a word, each row padded to a word.
 fn pack_rows(words: &mut Vec<u32>, entries: &[i16], columns: u32) {
     for row in entries.chunks(columns.max(1) as usize) {
-        words.extend(row.chunks(2).map(|pair| pair[0] as u16 as u32 | (pair.get(1).copied().unwrap_or(0) as u16 as u32) << 16));
+        words.extend(
+            row.chunks(2)
+                .map(|pair| pair[0] as u16 as u32 | (pair.get(1).copied().unwrap_or(0) as u16 as u32) << 16),
+        );
     }
 }
 
@@ -57,8 +70,8 @@ pub fn write_split(model: &MaterialModel) -> (Vec<u8>, Vec<u8>) {
     (material_file(model, Some((&dictionary, false))), dictionary)
 }
 
-/// A material that names a dictionary file, whose angular factors its model repeats; its spatial factors are in the
-/// dictionary, or its own.
+/// A material that names a dictionary file, whose angular factors its model repeats; its spatial factors are
+/// in the dictionary, or its own.
 pub fn write_with_dictionary(model: &MaterialModel, dictionary: &[u8], own_spatial: bool) -> Vec<u8> {
     material_file(model, Some((dictionary, own_spatial)))
 }
@@ -84,7 +97,10 @@ fn material_file(model: &MaterialModel, external: Option<(&[u8], bool)>) -> Vec<
             parts.extend(table.as_ref().map(|table| pair_table_part(kind, c, table, light_count)));
         }
     }
-    let ensembles: Vec<(u32, &EnsembleModel)> = (0u32..).zip(&model.channels).filter_map(|(c, channel)| Some((c, channel.ensemble.as_ref()?))).collect();
+    let ensembles: Vec<(u32, &EnsembleModel)> = (0u32..)
+        .zip(&model.channels)
+        .filter_map(|(c, channel)| Some((c, channel.ensemble.as_ref()?)))
+        .collect();
     let kinds: &[u32] = match external {
         None => &[ANGULAR, SPATIAL],
         Some((_, true)) => &[SPATIAL],
@@ -102,7 +118,9 @@ fn material_file(model: &MaterialModel, external: Option<(&[u8], bool)>) -> Vec<
         for layer in 0..model.layer_count {
             for &(c, ensemble) in &ensembles {
                 let coefficients = &ensemble.coefficients[level as usize][layer as usize];
-                let largest = coefficients.records.iter().map(|record| record.coefficients.len()).max().unwrap_or(0) as u32;
+                let largest =
+                    coefficients.records.iter().map(|record| record.coefficients.len()).max().unwrap_or(0)
+                        as u32;
                 at_level += 4 * record_operations(largest, model.edge);
                 let bytes = coefficients_bytes(coefficients, ensemble.dictionaries.len() as u32, largest);
                 parts.push(Part { kind: COEFFICIENTS, instance: level << 8 | layer << 4 | c, bytes });
@@ -111,7 +129,11 @@ fn material_file(model: &MaterialModel, external: Option<(&[u8], bool)>) -> Vec<
                 let lists = &tensor.lists[level as usize][layer as usize];
                 let largest = lists.lists.iter().map(Vec::len).max().unwrap_or(0) as u32;
                 at_level += layer_operations(largest, tensor.atoms.len() as u32, tensor.entries);
-                parts.push(Part { kind: LISTS, instance: level << 8 | layer << 4, bytes: lists_bytes(lists, tensor.atoms.len() as u32, largest) });
+                parts.push(Part {
+                    kind: LISTS,
+                    instance: level << 8 | layer << 4,
+                    bytes: lists_bytes(lists, tensor.atoms.len() as u32, largest),
+                });
             }
         }
         textures = textures.max(at_level);
@@ -147,7 +169,10 @@ fn material_file(model: &MaterialModel, external: Option<(&[u8], bool)>) -> Vec<
 /// A dictionary file: the factors of a model, its name and its optional sections.
 pub fn write_dictionary(model: &MaterialModel) -> Vec<u8> {
     let mut parts = vec![metadata_part(&model.metadata)];
-    let ensembles: Vec<(u32, &EnsembleModel)> = (0u32..).zip(&model.channels).filter_map(|(c, channel)| Some((c, channel.ensemble.as_ref()?))).collect();
+    let ensembles: Vec<(u32, &EnsembleModel)> = (0u32..)
+        .zip(&model.channels)
+        .filter_map(|(c, channel)| Some((c, channel.ensemble.as_ref()?)))
+        .collect();
     parts.extend(factor_parts(&ensembles, &[ANGULAR, SPATIAL]));
     parts.extend(model.tensor.iter().filter(|_| model.has_texture()).flat_map(tensor_atoms));
     parts.extend(extra_parts(model));
@@ -178,7 +203,12 @@ pub fn lay_out(mut header: [u32; 32], mut parts: Vec<Part>) -> Vec<u8> {
     let mut bytes = vec![0u8; HEADER_LENGTH as usize + parts.len() * 16];
     for (i, part) in parts.iter().enumerate() {
         bytes.resize(bytes.len().next_multiple_of(16), 0);
-        let entry = [part.kind | part.instance << 16, bytes.len() as u32, part.bytes.len() as u32, crc32(0, &part.bytes)];
+        let entry = [
+            part.kind | part.instance << 16,
+            bytes.len() as u32,
+            part.bytes.len() as u32,
+            crc32(0, &part.bytes),
+        ];
         let at = HEADER_LENGTH as usize + i * 16;
         bytes[at..at + 16].copy_from_slice(&words_to_bytes(&entry));
         bytes.extend(&part.bytes);
@@ -205,7 +235,9 @@ pub fn repair_checksums(bytes: &mut [u8]) {
     if bytes.len() < 128 {
         return;
     }
-    let word = |bytes: &[u8], at: usize| bytes.get(at..at + 4).map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])) as usize;
+    let word = |bytes: &[u8], at: usize| {
+        bytes.get(at..at + 4).map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])) as usize
+    };
     let count = word(bytes, 24).min(4096);
     let whole = count.min((bytes.len() - 128) / 16);
     for entry in (0..whole).map(|i| 128 + i * 16) {
@@ -219,7 +251,16 @@ pub fn repair_checksums(bytes: &mut [u8]) {
 }
 
 fn metadata_part(metadata: &MetadataModel) -> Part {
-    let mut bytes = words_to_bytes(&[metadata.texel_nm[0], metadata.texel_nm[1], metadata.frame, metadata.image_origin, metadata.primaries, 0, 0, 0]);
+    let mut bytes = words_to_bytes(&[
+        metadata.texel_nm[0],
+        metadata.texel_nm[1],
+        metadata.frame,
+        metadata.image_origin,
+        metadata.primaries,
+        0,
+        0,
+        0,
+    ]);
     for text in &metadata.texts {
         bytes.extend((text.len() as u32).to_le_bytes());
         bytes.extend(text.as_bytes());
@@ -230,7 +271,16 @@ fn metadata_part(metadata: &MetadataModel) -> Part {
 
 /// A set of directions as a section (5.3).
 pub fn directions_part(instance: u32, points: &[[i32; 2]], t: &Triangulation) -> Part {
-    let mut words = vec![points.len() as u32, t.triangles.len() as u32, t.hull.len() as u32, t.grid_size, t.candidates.len() as u32, 0, 0, 0];
+    let mut words = vec![
+        points.len() as u32,
+        t.triangles.len() as u32,
+        t.hull.len() as u32,
+        t.grid_size,
+        t.candidates.len() as u32,
+        0,
+        0,
+        0,
+    ];
     for &[x, y] in points {
         words.extend([x as u16 as u32 | (y as u16 as u32) << 16, cosine_of(x, y)]);
     }
@@ -257,15 +307,22 @@ fn pair_table_part(kind: u32, channel: u32, table: &PairTableModel, light_count:
 }
 
 fn extra_parts(model: &MaterialModel) -> impl Iterator<Item = Part> + '_ {
-    model.extras.iter().map(|(kind, instance, bytes)| Part { kind: *kind as u32, instance: *instance as u32, bytes: bytes.clone() })
+    model.extras.iter().map(|(kind, instance, bytes)| Part {
+        kind: *kind as u32,
+        instance: *instance as u32,
+        bytes: bytes.clone(),
+    })
 }
 
 fn factor_parts(ensembles: &[(u32, &EnsembleModel)], kinds: &[u32]) -> Vec<Part> {
     let mut parts = Vec::new();
     for &(c, ensemble) in ensembles {
         for &kind in kinds {
-            let pairs: Vec<[&FactorModel; 2]> =
-                ensemble.dictionaries.iter().map(|d| if kind == ANGULAR { [&d.light, &d.view] } else { [&d.x, &d.y] }).collect();
+            let pairs: Vec<[&FactorModel; 2]> = ensemble
+                .dictionaries
+                .iter()
+                .map(|d| if kind == ANGULAR { [&d.light, &d.view] } else { [&d.x, &d.y] })
+                .collect();
             let mut words = vec![pairs.len() as u32, 0];
             let mut tables = Vec::new();
             let head = 2 + pairs.len() as u32 * 4;
@@ -307,12 +364,14 @@ impl BitWriter {
             if self.length % 32 == 0 {
                 self.words.push(0);
             }
-            *self.words.last_mut().expect("just pushed") |= (value.checked_shr(i).unwrap_or(0) & 1) << (self.length % 32);
+            *self.words.last_mut().expect("just pushed") |=
+                (value.checked_shr(i).unwrap_or(0) & 1) << (self.length % 32);
             self.length += 1;
         }
     }
 
-    /// Ascending positions and their values: low parts with values, then high parts in unary (10.4-4, 10.4-5). Gives the last high part.
+    /// Ascending positions and their values: low parts with values, then high parts in unary (10.4-4,
+    /// 10.4-5). Gives the last high part.
     fn push_list(&mut self, list: &[(u32, u16)], low_bits: u32, value_bits: u32) -> u32 {
         for &(position, value) in list {
             self.push(position, low_bits);
@@ -359,7 +418,12 @@ fn coefficients_bytes(coefficients: &CoefficientsModel, dictionaries: u32, large
         stream.push(low_bits, LOW_BITS_BITS);
         stream.push_list(list, low_bits, coefficients.value_bits);
     }
-    let mut words = vec![coefficients.value_bits | dictionary_bits << 8 | count_bits << 16, coefficients.records.len() as u32, stream.length, largest];
+    let mut words = vec![
+        coefficients.value_bits | dictionary_bits << 8 | count_bits << 16,
+        coefficients.records.len() as u32,
+        stream.length,
+        largest,
+    ];
     words.extend(starts);
     words.extend(stream.words);
     words_to_bytes(&words)

@@ -59,8 +59,15 @@ macro_rules! module {
 }
 
 /// Modules that every method needs, in the order of the chapters.
-pub const SHARED: &[Module] =
-    &[module!("words"), module!("material"), module!("fixed"), module!("direction"), module!("position"), module!("colour"), module!("interpolation")];
+pub const SHARED: &[Module] = &[
+    module!("words"),
+    module!("material"),
+    module!("fixed"),
+    module!("direction"),
+    module!("position"),
+    module!("colour"),
+    module!("interpolation"),
+];
 
 /// The module of the sparse ensemble.
 pub const ENSEMBLE: Module = module!("ensemble");
@@ -84,7 +91,8 @@ pub const ENTRY_POINTS: [&str; 5] = ["texel", "filtered", "trilinear", "floats",
 /// The modules of a shader, in order.
 pub fn modules(request: &Request<'_>) -> Vec<Module> {
     let methods = METHODS.iter().zip([ENSEMBLE, TENSOR]).zip(LEFT_OUT);
-    let methods = methods.map(|((method, there), left_out)| if request.methods.contains(method) { there } else { left_out });
+    let methods = methods
+        .map(|((method, there), left_out)| if request.methods.contains(method) { there } else { left_out });
     SHARED.iter().copied().chain(methods).chain(request.entries.then_some(ENTRIES)).collect()
 }
 

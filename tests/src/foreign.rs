@@ -1,7 +1,8 @@
-//! Files of others, written for the tests from the layouts that are known of them, and what must be read from them.
+//! Files of others, written for the tests from the layouts that are known of them, and what must be read from
+//! them.
 //!
-//! Nothing here is shared with the readers of `selvedge_tools::foreign`: numbers are rounded as the file has them, and what is expected is computed from
-//! those in binary64 by the formulas of the formats.
+//! Nothing here is shared with the readers of `selvedge_tools::foreign`: numbers are rounded as the file has
+//! them, and what is expected is computed from those in binary64 by the formulas of the formats.
 
 use half::f16;
 use selvedge_tools::random::Random;
@@ -132,9 +133,19 @@ fn begin(signature: &str, version: usize, channels: &[&str]) -> Out {
 }
 
 /// A factorisation: S, U and SxV of `rows x columns`; gives the product, `[row][column]`.
-fn factorisation(out: &mut Out, random: &mut Random, width: usize, components: usize, [rows, columns]: [usize; 2], offset: f64) -> Vec<f64> {
-    let mut some = |count: usize, base: f64| -> Vec<f64> { (0..count).map(|_| base + random.range(-1000, 1000) as f64 / 4000.0).collect() };
-    let (s, mut u, v) = (some(components, 1.0), some(rows * components, 0.0), some(columns * components, 1.0));
+fn factorisation(
+    out: &mut Out,
+    random: &mut Random,
+    width: usize,
+    components: usize,
+    [rows, columns]: [usize; 2],
+    offset: f64,
+) -> Vec<f64> {
+    let mut some = |count: usize, base: f64| -> Vec<f64> {
+        (0..count).map(|_| base + random.range(-1000, 1000) as f64 / 4000.0).collect()
+    };
+    let (s, mut u, v) =
+        (some(components, 1.0), some(rows * components, 0.0), some(columns * components, 1.0));
     // The first component carries the level of the values.
     (0..rows).for_each(|row| u[row * components] += offset);
     out.0.push(width as u8);
@@ -142,13 +153,22 @@ fn factorisation(out: &mut Out, random: &mut Random, width: usize, components: u
     out.numbers(width, &s);
     let u = out.numbers(width, &u);
     let v = out.numbers(width, &v);
-    (0..rows * columns).map(|i| (0..components).map(|k| u[i / columns * components + k] * v[i % columns * components + k]).sum()).collect()
+    (0..rows * columns)
+        .map(|i| {
+            (0..components).map(|k| u[i / columns * components + k] * v[i % columns * components + k]).sum()
+        })
+        .collect()
 }
 
 /// All texels, as they stand in the file, from values at `(texel of the file, pair, channel)`.
-fn arranged(value: impl Fn(usize, usize, usize) -> f64, colour: impl Fn([f64; 3]) -> [f64; 3]) -> Vec<[f64; 3]> {
+fn arranged(
+    value: impl Fn(usize, usize, usize) -> f64,
+    colour: impl Fn([f64; 3]) -> [f64; 3],
+) -> Vec<[f64; 3]> {
     let pairs = LIGHTS.len() * VIEWS.len();
-    (0..SIZE[0] * SIZE[1] * pairs).map(|i| colour([0, 1, 2].map(|c| value(i / pairs, i % pairs, c)))).collect()
+    (0..SIZE[0] * SIZE[1] * pairs)
+        .map(|i| colour([0, 1, 2].map(|c| value(i / pairs, i % pairs, c))))
+        .collect()
 }
 
 /// The colour models by their numbers, from the published readers.
@@ -158,10 +178,15 @@ fn colour(model: usize, matrix: &[f32; 9], mean: &[f32; 3], v: [f64; 3]) -> [f64
     match model {
         0 => v,
         1 => yuv(v),
-        3 => [0, 1, 2].map(|c| (0..3).map(|r| v[r] * f64::from(matrix[r * 3 + c])).sum::<f64>() + f64::from(mean[c])),
+        3 => [0, 1, 2]
+            .map(|c| (0..3).map(|r| v[r] * f64::from(matrix[r * 3 + c])).sum::<f64>() + f64::from(mean[c])),
         4 => [v[0] + v[1] - v[2], v[0] + v[2], v[0] - v[1] - v[2]],
         9 => yuv([v[0].exp() - E, v[1], v[2]]),
-        10 => yuv([v[0].exp() - E, v[1].signum() * (v[1].abs() + E.ln()).exp(), v[2].signum() * (v[2].abs() + E.ln()).exp()]),
+        10 => yuv([
+            v[0].exp() - E,
+            v[1].signum() * (v[1].abs() + E.ln()).exp(),
+            v[2].signum() * (v[2].abs() + E.ln()).exp(),
+        ]),
         11 => {
             let y = v[0].exp() - E;
             yuv([y, v[1] * (y + E), v[2] * (y + E)])
@@ -172,7 +197,13 @@ fn colour(model: usize, matrix: &[f32; 9], mean: &[f32; 3], v: [f64; 3]) -> [f64
 
 fn written(name: String, out: Out, expected: Vec<[f64; 3]>) -> Written {
     let largest = expected.iter().flatten().fold(1.0f64, |a, b| a.max(b.abs()));
-    Written { name, bytes: out.0, shape: [SIZE[0], SIZE[1], LIGHTS.len(), VIEWS.len()], expected, tolerance: largest * 3e-6 }
+    Written {
+        name,
+        bytes: out.0,
+        shape: [SIZE[0], SIZE[1], LIGHTS.len(), VIEWS.len()],
+        expected,
+        tolerance: largest * 3e-6,
+    }
 }
 
 fn decorrelated(model: usize, width: usize, version: usize, channels: &[&str], transposed: bool) -> Written {
@@ -187,18 +218,40 @@ fn decorrelated(model: usize, width: usize, version: usize, channels: &[&str], t
     // U and V of the model 10 are logarithms over e.
     let offset = |c: usize| if model == 10 && c > 0 { 9.0 } else { 0.6 };
     let planes: Vec<Vec<f64>> = (0..channels.len())
-        .map(|c| factorisation(&mut out, &mut random, width, 4 - c, if transposed { [texels, pairs] } else { [pairs, texels] }, offset(c)))
+        .map(|c| {
+            factorisation(
+                &mut out,
+                &mut random,
+                width,
+                4 - c,
+                if transposed { [texels, pairs] } else { [pairs, texels] },
+                offset(c),
+            )
+        })
         .collect();
-    let value = |texel: usize, pair: usize, c: usize| planes[c.min(channels.len() - 1)][if transposed { texel * pairs + pair } else { pair * texels + texel }];
+    let value = |texel: usize, pair: usize, c: usize| {
+        planes[c.min(channels.len() - 1)]
+            [if transposed { texel * pairs + pair } else { pair * texels + texel }]
+    };
     let expected = arranged(value, |v| colour(model, &matrix, &mean, v));
     written(
-        format!("DFMF08FCR, model {model}, {width} bytes, version {version}, {} channels{}", channels.len(), if transposed { ", transposed" } else { "" }),
+        format!(
+            "DFMF08FCR, model {model}, {width} bytes, version {version}, {} channels{}",
+            channels.len(),
+            if transposed { ", transposed" } else { "" }
+        ),
         out,
         expected,
     )
 }
 
-fn full(signature: &str, extension: Option<(u8, bool, bool)>, width: usize, channels: &[&str], transposed: bool) -> Written {
+fn full(
+    signature: &str,
+    extension: Option<(u8, bool, bool)>,
+    width: usize,
+    channels: &[&str],
+    transposed: bool,
+) -> Written {
     let mut random = Random::new(width as u64 + 7);
     let mut out = begin(signature, 4, channels);
     let mut is_log = false;
@@ -218,14 +271,35 @@ fn full(signature: &str, extension: Option<(u8, bool, bool)>, width: usize, chan
     let count = channels.len();
     let (texels, pairs) = (SIZE[0] * SIZE[1], LIGHTS.len() * VIEWS.len());
     out.u32(5);
-    let plane = factorisation(&mut out, &mut random, width, 5, if transposed { [texels * count, pairs] } else { [pairs * count, texels] }, 0.5);
+    let plane = factorisation(
+        &mut out,
+        &mut random,
+        width,
+        5,
+        if transposed { [texels * count, pairs] } else { [pairs * count, texels] },
+        0.5,
+    );
     let value = |texel: usize, pair: usize, c: usize| {
         let c = c.min(count - 1);
-        plane[if transposed { (texel * count + c) * pairs + pair } else { (pair * count + c) * texels + texel }]
+        plane[if transposed {
+            (texel * count + c) * pairs + pair
+        } else {
+            (pair * count + c) * texels + texel
+        }]
     };
     let expected = arranged(value, |v| if is_log { v.map(|v| v.exp() - 1e-5) } else { v });
-    let extension = extension.map_or(String::new(), |(version, log, heights)| format!(", extension {version}, log {log}, heights {heights}"));
-    written(format!("{}{extension}, {width} bytes, {count} channels{}", &signature[1..], if transposed { ", transposed" } else { "" }), out, expected)
+    let extension = extension.map_or(String::new(), |(version, log, heights)| {
+        format!(", extension {version}, log {log}, heights {heights}")
+    });
+    written(
+        format!(
+            "{}{extension}, {width} bytes, {count} channels{}",
+            &signature[1..],
+            if transposed { ", transposed" } else { "" }
+        ),
+        out,
+        expected,
+    )
 }
 
 fn by_view(signature: &str, old: bool, width: usize, transposed: bool) -> Written {
@@ -249,7 +323,9 @@ fn by_view(signature: &str, old: bool, width: usize, transposed: bool) -> Writte
     for view in 0..VIEWS.len() {
         let components = 3 - view;
         let (weights, dimension) = if transposed { (lights, texels * 3) } else { (texels, lights * 3) };
-        let mut some = |count: usize, base: f64| -> Vec<f64> { (0..count).map(|_| base + random.range(-1000, 1000) as f64 / 4000.0).collect() };
+        let mut some = |count: usize, base: f64| -> Vec<f64> {
+            (0..count).map(|_| base + random.range(-1000, 1000) as f64 / 4000.0).collect()
+        };
         out.0.push(width as u8);
         out.u32s([components, weights, dimension]);
         out.numbers(width, &some(components, 1.0));
@@ -261,11 +337,13 @@ fn by_view(signature: &str, old: bool, width: usize, transposed: bool) -> Writte
     let value = |texel: usize, pair: usize, channel: usize| {
         let (components, mean, c, w) = &planes[pair / lights];
         let light = pair % lights;
-        let (at, weight) = if transposed { (texel * 3 + channel, light) } else { (light * 3 + channel, texel) };
+        let (at, weight) =
+            if transposed { (texel * 3 + channel, light) } else { (light * 3 + channel, texel) };
         mean[at] + (0..*components).map(|k| c[at * components + k] * w[weight * components + k]).sum::<f64>()
     };
     let expected = arranged(value, |v| v);
-    let words = [if old { ", older layout" } else { "" }, if transposed { ", transposed" } else { "" }].concat();
+    let words =
+        [if old { ", older layout" } else { "" }, if transposed { ", transposed" } else { "" }].concat();
     written(format!("{}, {width} bytes{words}", &signature[1..]), out, expected)
 }
 
@@ -281,7 +359,8 @@ fn store(compression: u8, lines: usize, channels: &[&str]) -> Written {
     out.0.extend(mask);
     out.rotations(0);
     let (texels, count) = (SIZE[0] * SIZE[1], LIGHTS.len() * VIEWS.len() * channels.len());
-    let numbers: Vec<f64> = (0..texels * count).map(|_| f16::from_f64(random.range(0, 4000) as f64 / 1000.0).to_f64()).collect();
+    let numbers: Vec<f64> =
+        (0..texels * count).map(|_| f16::from_f64(random.range(0, 4000) as f64 / 1000.0).to_f64()).collect();
     let is_there = |texel: usize| compression == 0 || mask[texel] != 0;
     let there: Vec<usize> = (0..texels).filter(|&texel| is_there(texel)).collect();
     for chunk in there.chunks(lines * SIZE[0]) {
@@ -291,10 +370,21 @@ fn store(compression: u8, lines: usize, channels: &[&str]) -> Written {
         });
     }
     let value = |texel: usize, pair: usize, c: usize| {
-        if is_there(texel) { numbers[texel * count + pair * channels.len() + c.min(channels.len() - 1)] } else { 0.0 }
+        if is_there(texel) {
+            numbers[texel * count + pair * channels.len() + c.min(channels.len() - 1)]
+        } else {
+            0.0
+        }
     };
     let expected = arranged(value, |v| v);
-    Written { tolerance: 0.0, ..written(format!("BDIF06R2!, compression {compression}, {lines} lines, {} channels", channels.len()), out, expected) }
+    Written {
+        tolerance: 0.0,
+        ..written(
+            format!("BDIF06R2!, compression {compression}, {lines} lines, {} channels", channels.len()),
+            out,
+            expected,
+        )
+    }
 }
 
 /// A file of every variant that is read.
@@ -311,7 +401,14 @@ pub fn btf_variants() -> Vec<Written> {
     }
     all.push(decorrelated(0, 4, 4, &["550"], false));
     all.push(decorrelated(11, 2, 4, RGB, true));
-    for extension in [(0, false, false), (1, false, false), (1, true, false), (2, true, false), (2, false, true), (2, true, true)] {
+    for extension in [
+        (0, false, false),
+        (1, false, false),
+        (1, true, false),
+        (2, true, false),
+        (2, false, true),
+        (2, true, true),
+    ] {
         all.push(full("!FMF12FCER", Some(extension), 4, RGB, false));
     }
     for width in [2, 4, 8] {
@@ -335,11 +432,17 @@ pub fn btf_variants() -> Vec<Written> {
     all
 }
 
-/// A large `DFMF08FCR` as UBO2014 has them, written piece by piece: colour model 11, binary16, a plausible cloth of the stated numbers of components.
+/// A large `DFMF08FCR` as UBO2014 has them, written piece by piece: colour model 11, binary16, a plausible
+/// cloth of the stated numbers of components.
 ///
 /// # Errors
 /// On I/O.
-pub fn write_large(out: &mut impl std::io::Write, size: [usize; 2], directions: &[[f32; 2]], components: [usize; 3]) -> std::io::Result<()> {
+pub fn write_large(
+    out: &mut impl std::io::Write,
+    size: [usize; 2],
+    directions: &[[f32; 2]],
+    components: [usize; 3],
+) -> std::io::Result<()> {
     let mut head = Out(b"!DFMF08FCR".to_vec());
     head.meta(4, 1, &["R", "G", "B"]);
     head.u32(directions.len());
@@ -355,23 +458,37 @@ pub fn write_large(out: &mut impl std::io::Write, size: [usize; 2], directions: 
     (0..12).for_each(|_| head.f32(0.0));
     out.write_all(&head.0)?;
     let (texels, pairs) = (size[0] * size[1], directions.len() * directions.len());
-    let vector = |[polar, azimuth]: [f32; 2]| [polar.sin() * azimuth.cos(), polar.sin() * azimuth.sin(), polar.cos()];
+    let vector =
+        |[polar, azimuth]: [f32; 2]| [polar.sin() * azimuth.cos(), polar.sin() * azimuth.sin(), polar.cos()];
     let mut random = Random::new(1);
     for (channel, count) in components.into_iter().enumerate() {
         let mut block = Out(vec![2]);
         block.u32s([count, pairs, texels]);
         block.numbers(2, &vec![1.0; count]);
-        // Rows of pairs: the level of a diffuse surface with a lobe, then smooth waves over both directions, weaker and finer.
-        let phases: Vec<[f64; 5]> = (0..count).map(|k| [0, 1, 2, 3, 4].map(|_| random.range(-1000, 1000) as f64 / 1000.0 * (2.0 + k as f64 / 6.0))).collect();
+        // Rows of pairs: the level of a diffuse surface with a lobe, then smooth waves over both directions,
+        // weaker and finer.
+        let phases: Vec<[f64; 5]> = (0..count)
+            .map(|k| {
+                [0, 1, 2, 3, 4].map(|_| random.range(-1000, 1000) as f64 / 1000.0 * (2.0 + k as f64 / 6.0))
+            })
+            .collect();
         for pair in 0..pairs {
-            let (l, v) = (vector(directions[pair % directions.len()]), vector(directions[pair / directions.len()]));
+            let (l, v) =
+                (vector(directions[pair % directions.len()]), vector(directions[pair / directions.len()]));
             let row: Vec<f64> = (0..count)
                 .map(|k| {
-                    let wave =
-                        phases[k][0] * f64::from(l[0]) + phases[k][1] * f64::from(l[1]) + phases[k][2] * f64::from(v[0]) + phases[k][3] * f64::from(v[1]);
+                    let wave = phases[k][0] * f64::from(l[0])
+                        + phases[k][1] * f64::from(l[1])
+                        + phases[k][2] * f64::from(v[0])
+                        + phases[k][3] * f64::from(v[1]);
                     let half: f32 = l[2] + v[2];
-                    let level = [f64::from(l[2].max(0.02)).ln() - 1.5 + f64::from(half - 1.0), 0.05, 0.02][channel];
-                    if k == 0 { level } else { (wave + phases[k][4]).sin() * [0.5, 0.02, 0.02][channel] / (k as f64).powf(0.8) }
+                    let level =
+                        [f64::from(l[2].max(0.02)).ln() - 1.5 + f64::from(half - 1.0), 0.05, 0.02][channel];
+                    if k == 0 {
+                        level
+                    } else {
+                        (wave + phases[k][4]).sin() * [0.5, 0.02, 0.02][channel] / (k as f64).powf(0.8)
+                    }
                 })
                 .collect();
             block.numbers(2, &row);

@@ -1,4 +1,5 @@
-//! What several tests share: where the data are, loud words for what is skipped, files of others, and the bodies of the fuzz targets.
+//! What several tests share: where the data are, loud words for what is skipped, files of others, and the
+//! bodies of the fuzz targets.
 
 pub mod foreign;
 pub mod targets;
@@ -12,7 +13,9 @@ pub fn excerpt_folder() -> PathBuf {
 
 /// The full data, if `SELVEDGE_DATA` names them; says so loudly if not.
 pub fn full_data_folder(what_is_skipped: &str) -> Option<PathBuf> {
-    let folder = std::env::var_os("SELVEDGE_DATA").map(|data| PathBuf::from(data).join("sparsebtf")).filter(|folder| folder.is_dir());
+    let folder = std::env::var_os("SELVEDGE_DATA")
+        .map(|data| PathBuf::from(data).join("sparsebtf"))
+        .filter(|folder| folder.is_dir());
     if folder.is_none() {
         eprintln!("SKIPPED: {what_is_skipped}: SELVEDGE_DATA DOES NOT NAME A FOLDER WITH sparsebtf/ IN IT");
     }

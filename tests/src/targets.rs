@@ -1,6 +1,7 @@
 //! Bodies of the fuzz targets: each takes any bytes and asserts more than that nothing panics.
 //!
-//! The targets of `fuzz/` call them under libFuzzer, `soak` calls them without it, and the ordinary tests replay seeds and regressions.
+//! The targets of `fuzz/` call them under libFuzzer, `soak` calls them without it, and the ordinary tests
+//! replay seeds and regressions.
 
 use selvedge::batch::FilteredQuery;
 use selvedge::{Direction, Finding, First, Limits, Part, Rgb, Selvedge};
@@ -59,7 +60,10 @@ pub fn suite() -> &'static [Vector] {
 
 /// Valid materials that need no dictionary.
 fn valid() -> impl Iterator<Item = &'static [u8]> {
-    suite().iter().filter(|v| matches!(v.answer, Answer::Digest(_)) && v.dictionary.is_none()).map(|v| &v.bytes[..])
+    suite()
+        .iter()
+        .filter(|v| matches!(v.answer, Answer::Digest(_)) && v.dictionary.is_none())
+        .map(|v| &v.bytes[..])
 }
 
 /// A number from the front of the data; zero where it ends.
@@ -82,7 +86,8 @@ fn direction(random: &mut Random) -> Direction {
     Direction { x_q18: part(263_000), y_q18: part(263_000), z_q15: part(32_800) }
 }
 
-/// Opens and, where that succeeds, samples on every path; the paths agree and no sample costs more than is stated.
+/// Opens and, where that succeeds, samples on every path; the paths agree and no sample costs more than is
+/// stated.
 ///
 /// Gives whether the file is legal.
 pub fn open_and_sample(file: &[u8], dictionary: Option<&[u8]>) -> bool {
@@ -117,8 +122,14 @@ pub fn open_and_sample(file: &[u8], dictionary: Option<&[u8]>) -> bool {
 fn sample_all_paths(material: &Selvedge<'_>, seed: u64) {
     let random = &mut Random::new(seed);
     let header = *material.header();
-    let queries: Vec<FilteredQuery> =
-        (0..3).map(|_| FilteredQuery { u_q32: random.word(), v_q32: random.word(), light: direction(random), view: direction(random) }).collect();
+    let queries: Vec<FilteredQuery> = (0..3)
+        .map(|_| FilteredQuery {
+            u_q32: random.word(),
+            v_q32: random.word(),
+            light: direction(random),
+            view: direction(random),
+        })
+        .collect();
     let mut scratch = vec![-1; material.batch_scratch_len(queries.len())];
     let mut out = vec![Rgb::default(); queries.len()];
     material.sample_batch(&queries, &mut scratch, &mut out).expect("buffers fit");
@@ -126,14 +137,37 @@ fn sample_all_paths(material: &Selvedge<'_>, seed: u64) {
         assert_eq!(material.filtered(query.u_q32, query.v_q32, query.light, query.view), *rgb, "{query:?}");
         let level = random.word() % header.level_count;
         let counted = count::filtered(material, level, query.u_q32, query.v_q32, query.light, query.view);
-        assert!(counted.operations <= header.operations as u64, "{} operations where {} are stated", counted.operations, header.operations);
+        assert!(
+            counted.operations <= header.operations as u64,
+            "{} operations where {} are stated",
+            counted.operations,
+            header.operations
+        );
         let (light, view) = (material.locate_light(query.light), material.locate_view(query.view));
-        let values = selvedge::interpolation::filtered_values(material.words(), material.material(), level, query.u_q32, query.v_q32, light, view);
-        assert_eq!(counted.values, [values.c0, values.c1, values.c2], "the count walks another way than the decoder");
+        let values = selvedge::interpolation::filtered_values(
+            material.words(),
+            material.material(),
+            level,
+            query.u_q32,
+            query.v_q32,
+            light,
+            view,
+        );
+        assert_eq!(
+            counted.values,
+            [values.c0, values.c1, values.c2],
+            "the count walks another way than the decoder"
+        );
         let whole = material.trilinear(level << 16, query.u_q32, query.v_q32, query.light, query.view);
         assert_eq!(selvedge::interpolation::radiance(material.material(), values, light), whole);
     }
-    material.trilinear(random.word() >> 12, random.word(), random.word(), direction(random), direction(random));
+    material.trilinear(
+        random.word() >> 12,
+        random.word(),
+        random.word(),
+        direction(random),
+        direction(random),
+    );
     material.point(random.word(), random.word() >> 22, random.word(), random.word() >> 22);
     let [width, height] = material.image_size(0);
     if width as usize * height as usize <= 1024 {
@@ -145,24 +179,41 @@ fn sample_all_paths(material: &Selvedge<'_>, seed: u64) {
         for (c, channel) in channels.iter_mut().enumerate() {
             material.decode_channel(c, 0, light, view, &mut scratch, channel).expect("buffers fit");
             let short = channel.len() - 1;
-            let error = material.decode_channel(c, 0, light, view, &mut scratch, &mut channel[..short]).expect_err("one texel too few");
+            let error = material
+                .decode_channel(c, 0, light, view, &mut scratch, &mut channel[..short])
+                .expect_err("one texel too few");
             assert_eq!((error.needed, error.lent), (short + 1, short));
         }
         let (light, view) = (material.locate_light(light), material.locate_view(view));
         for _ in 0..4 {
             let (x, y) = (random.word() % width, random.word() % height);
-            let values = selvedge::interpolation::texel_values(material.words(), material.material(), x, y, light, view);
+            let values = selvedge::interpolation::texel_values(
+                material.words(),
+                material.material(),
+                x,
+                y,
+                light,
+                view,
+            );
             let at = (y * width + x) as usize;
             assert_eq!(selvedge::interpolation::radiance(material.material(), values, light), image[at]);
-            assert_eq!([values.c0, values.c1, values.c2], [channels[0][at], channels[1][at], channels[2][at]]);
+            assert_eq!(
+                [values.c0, values.c1, values.c2],
+                [channels[0][at], channels[1][at], channels[2][at]]
+            );
         }
     }
     floats(random);
     // In a buffer of several files every word moves by the same number, the dictionary's by its own.
     let (here, there) = (material.material_at(0, 0), material.material_at(16, 1 << 20));
-    assert_eq!((there.file_start, there.light_start, there.channels[0].state), (16, here.light_start + 16, here.channels[0].state));
+    assert_eq!(
+        (there.file_start, there.light_start, there.channels[0].state),
+        (16, here.light_start + 16, here.channels[0].state)
+    );
     let metadata = material.metadata();
-    assert!(metadata.name.len() + metadata.origin.len() + metadata.licence.len() <= header.file_length as usize);
+    assert!(
+        metadata.name.len() + metadata.origin.len() + metadata.licence.len() <= header.file_length as usize
+    );
     assert!(material.sections().all(|s| s.offset as u64 + s.length as u64 <= header.file_length as u64));
 }
 
@@ -205,7 +256,8 @@ pub fn prefix(data: &[u8]) {
     open_and_sample(&file, None);
 }
 
-/// Structured damage: words of sections changed, sections resized, doubled, taken away, exchanged; then laid out properly.
+/// Structured damage: words of sections changed, sections resized, doubled, taken away, exchanged; then laid
+/// out properly.
 pub fn mutate(data: &[u8]) {
     let mut rest = data;
     let number = take(&mut rest) as usize;
@@ -234,7 +286,11 @@ pub fn mutate(data: &[u8]) {
             1..=4 if words > 0 => {
                 let at = at % words * 4;
                 let old = u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
-                let new = if action >> 15 == 0 { value } else { old.wrapping_add(value as u16 as i16 as i32 as u32) };
+                let new = if action >> 15 == 0 {
+                    value
+                } else {
+                    old.wrapping_add(value as u16 as i16 as i32 as u32)
+                };
                 bytes[at..at + 4].copy_from_slice(&new.to_le_bytes());
             }
             5 => bytes.resize((value as usize % 4096).min(bytes.len() + 64) / 4 * 4, 0),
@@ -254,10 +310,12 @@ pub fn mutate(data: &[u8]) {
 
 /// A legal model grown from the data is written, read, written again with the same bytes, and sampled.
 pub fn generate(data: &[u8]) {
-    // Full sizes cost a hundred times more, so most inputs grow small models; some seeds have lengths of full ones.
+    // Full sizes cost a hundred times more, so most inputs grow small models; some seeds have lengths of full
+    // ones.
     let reach = if data.len() % 64 == 0 { Reach::FULL } else { Reach::SMALL };
     // The last byte says which method; without one it is the first.
-    let grow = if data.last().is_some_and(|byte| byte & 1 == 1) { extreme_tensor_from } else { extreme_model_from };
+    let grow =
+        if data.last().is_some_and(|byte| byte & 1 == 1) { extreme_tensor_from } else { extreme_model_from };
     let model = grow(&mut Random::from_bytes(data), reach);
     let file = write_material(&model);
     let material = selvedge::open(&file, &Limits::NONE).unwrap_or_else(|finding| panic!("{finding}"));
@@ -268,7 +326,8 @@ pub fn generate(data: &[u8]) {
     assert!(write_material(&back) == file, "decoding and encoding is not the identity");
     if model.has_texture() {
         let (split, dictionary) = write_split(&model);
-        let split = selvedge::open_with(&split, Some(&dictionary), &Limits::NONE).unwrap_or_else(|finding| panic!("{finding}"));
+        let split = selvedge::open_with(&split, Some(&dictionary), &Limits::NONE)
+            .unwrap_or_else(|finding| panic!("{finding}"));
         let query = Direction { x_q18: 1000, y_q18: -70_000, z_q15: 30_000 };
         assert_eq!(split.filtered(7, 1 << 31, query, query), material.filtered(7, 1 << 31, query, query));
     }
@@ -278,14 +337,17 @@ pub fn generate(data: &[u8]) {
 pub fn paths(data: &[u8]) {
     let mut rest = data;
     let files: Vec<&[u8]> = valid().collect();
-    let material = selvedge::open(files[take(&mut rest) as usize % files.len()], &Limits::NONE).expect("a valid vector");
+    let material =
+        selvedge::open(files[take(&mut rest) as usize % files.len()], &Limits::NONE).expect("a valid vector");
     let wide = |rest: &mut &[u8]| take(rest) << 16 | take(rest);
     let mut queries = Vec::new();
     while !rest.is_empty() && queries.len() < 8 {
         let direction = |rest: &mut &[u8]| {
             let [x, y, z] = [wide(rest), wide(rest), wide(rest)];
             // All words, and those that mean something.
-            let near = |word: u32, reach: i32| if word & 1 == 0 { word as i32 } else { (word as i32 >> 1) % (reach + 2) };
+            let near = |word: u32, reach: i32| {
+                if word & 1 == 0 { word as i32 } else { (word as i32 >> 1) % (reach + 2) }
+            };
             Direction { x_q18: near(x, 262_144), y_q18: near(y, 262_144), z_q15: near(z, 32_768) }
         };
         let (light, view) = (direction(&mut rest), direction(&mut rest));
@@ -298,7 +360,12 @@ pub fn paths(data: &[u8]) {
         assert_eq!(material.filtered(query.u_q32, query.v_q32, query.light, query.view), *rgb, "{query:?}");
         for taps in [material.locate_light(query.light), material.locate_view(query.view)] {
             assert_eq!(taps.weight_a_q15 + taps.weight_b_q15 + taps.weight_c_q15, 32_768);
-            assert!(taps.weight_a_q15 >= 0 && taps.weight_b_q15 >= 0 && taps.weight_c_q15 >= 0 && (0..=32_768).contains(&taps.cosine_q15));
+            assert!(
+                taps.weight_a_q15 >= 0
+                    && taps.weight_b_q15 >= 0
+                    && taps.weight_c_q15 >= 0
+                    && (0..=32_768).contains(&taps.cosine_q15)
+            );
         }
     }
 }
@@ -308,7 +375,8 @@ pub fn importers(data: &[u8]) {
     let mut rest = data;
     let kind = take(&mut rest);
     let scratch = Scratch::new();
-    let put = |name: &str, bytes: &[u8]| std::fs::write(scratch.0.join(name), bytes).expect("a file of its own");
+    let put =
+        |name: &str, bytes: &[u8]| std::fs::write(scratch.0.join(name), bytes).expect("a file of its own");
     match kind % 5 {
         0 => {
             put("a.selvset", rest);
@@ -327,7 +395,10 @@ pub fn importers(data: &[u8]) {
         _ => {
             // One of the foreign files is the data, the others are as they were.
             let excerpt = crate::excerpt_folder();
-            let mut names: Vec<PathBuf> = std::fs::read_dir(&excerpt).expect("excerpt").filter_map(|e| e.ok().map(|e| e.path())).collect();
+            let mut names: Vec<PathBuf> = std::fs::read_dir(&excerpt)
+                .expect("excerpt")
+                .filter_map(|e| e.ok().map(|e| e.path()))
+                .collect();
             names.retain(|path| path.extension().is_some_and(|ending| ending == "bin"));
             names.sort();
             let chosen = (kind / 5) as usize % names.len();
@@ -350,7 +421,8 @@ pub fn importers(data: &[u8]) {
                 && let Ok(model) = material.to_model(6)
             {
                 // Whatever is imported is a legal file.
-                selvedge::open(&write_material(&model), &Limits::NONE).unwrap_or_else(|finding| panic!("{finding}"));
+                selvedge::open(&write_material(&model), &Limits::NONE)
+                    .unwrap_or_else(|finding| panic!("{finding}"));
             }
         }
     }
@@ -368,11 +440,14 @@ fn import_folder(path: &Path) {
 /// Bytes that decoding an image of a hostile file may take.
 pub const IMAGE_MEMORY: usize = 4 << 20;
 
-/// Containers of Bonn: refused with a place inside the file, or every texel that is asked for has its numbers.
+/// Containers of Bonn: refused with a place inside the file, or every texel that is asked for has its
+/// numbers.
 pub fn btf(data: &[u8]) {
     let length = data.len() as u64;
     let inside = |error: ToolError| match error {
-        ToolError::Foreign { offset, what, .. } => assert!(offset <= length && !what.is_empty(), "{offset} of {length}: {what}"),
+        ToolError::Foreign { offset, what, .. } => {
+            assert!(offset <= length && !what.is_empty(), "{offset} of {length}: {what}")
+        }
         other => panic!("{other}"),
     };
     let btf = match Btf::read(Bytes::from_memory(Path::new("a.btf"), data.to_vec())) {
@@ -399,7 +474,9 @@ pub fn btf(data: &[u8]) {
 
 /// Zip archives of images: refused with words, or the first and the last image have their pixels.
 pub fn archive(data: &[u8]) {
-    let Ok(archive) = Archive::from_bytes(Bytes::from_memory(Path::new("a.zip"), data.to_vec())) else { return };
+    let Ok(archive) = Archive::from_bytes(Bytes::from_memory(Path::new("a.zip"), data.to_vec())) else {
+        return;
+    };
     assert!(archive.names().expect("the directory is read").len() <= data.len());
     let Ok(set) = ImageSet::of(archive, IMAGE_MEMORY) else { return };
     let options = ImportOptions { memory: IMAGE_MEMORY, ..ImportOptions::default() };
@@ -432,7 +509,8 @@ impl Scratch {
         // Memory where there is a folder in it.
         let shared = Path::new("/dev/shm");
         let base = if shared.is_dir() { shared.to_owned() } else { std::env::temp_dir() };
-        let path = base.join(format!("selvedge-{}-{}", std::process::id(), NUMBER.fetch_add(1, Ordering::Relaxed)));
+        let path =
+            base.join(format!("selvedge-{}-{}", std::process::id(), NUMBER.fetch_add(1, Ordering::Relaxed)));
         std::fs::create_dir_all(&path).expect("a folder of its own");
         Scratch(path)
     }

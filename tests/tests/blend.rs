@@ -6,7 +6,9 @@ use selvedge::{Direction, Limits, Selvedge, Values};
 use selvedge_tests::setting;
 use selvedge_tools::blend::{Blend, Report, blend};
 use selvedge_tools::extreme::extreme_model;
-use selvedge_tools::model::{AtomModel, DictionaryModel, EnsembleModel, FactorModel, MaterialModel, TransferModel};
+use selvedge_tools::model::{
+    AtomModel, DictionaryModel, EnsembleModel, FactorModel, MaterialModel, TransferModel,
+};
 use selvedge_tools::quantise::{FloatRecord, quantise};
 use selvedge_tools::random::Random;
 use selvedge_tools::read::read_model;
@@ -15,7 +17,8 @@ use selvedge_tools::write::write_material;
 use std::path::Path;
 
 fn excerpt() -> MaterialModel {
-    let file = std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("data/carpet07-excerpt.selv")).expect("excerpt");
+    let file = std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("data/carpet07-excerpt.selv"))
+        .expect("excerpt");
     read_model(&file, None, &Limits::NONE).expect("legal")
 }
 
@@ -24,7 +27,11 @@ fn open(file: &[u8]) -> Selvedge<'_> {
 }
 
 fn cases(count: u32) -> ProptestConfig {
-    ProptestConfig { cases: setting("SELVEDGE_CASES", count as usize) as u32, failure_persistence: None, ..ProptestConfig::default() }
+    ProptestConfig {
+        cases: setting("SELVEDGE_CASES", count as usize) as u32,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    }
 }
 
 fn as_array(values: Values) -> [i32; 3] {
@@ -34,7 +41,11 @@ fn as_array(values: Values) -> [i32; 3] {
 /// Values of one place and pair on one level.
 fn values(material: &Selvedge<'_>, random: &mut Random) -> [i32; 3] {
     let r = random;
-    let mut direction = || Direction { x_q18: r.range(-200_000, 200_000) as i32, y_q18: r.range(-200_000, 200_000) as i32, z_q15: r.range(0, 32_768) as i32 };
+    let mut direction = || Direction {
+        x_q18: r.range(-200_000, 200_000) as i32,
+        y_q18: r.range(-200_000, 200_000) as i32,
+        z_q15: r.range(0, 32_768) as i32,
+    };
     let (light, view) = (material.locate_light(direction()), material.locate_view(direction()));
     let level = r.range(0, material.header().level_count as i64 - 1) as u32;
     as_array(filtered_values(material.words(), material.material(), level, r.word(), r.word(), light, view))
@@ -42,7 +53,13 @@ fn values(material: &Selvedge<'_>, random: &mut Random) -> [i32; 3] {
 
 /// The largest difference, Q20, of a blend to the blend of what both decode to; values at the bound, where
 /// they are cut, do not count.
-fn largest_difference(a: &MaterialModel, b: &MaterialModel, alpha: f64, blended: &MaterialModel, count: u64) -> [f64; 3] {
+fn largest_difference(
+    a: &MaterialModel,
+    b: &MaterialModel,
+    alpha: f64,
+    blended: &MaterialModel,
+    count: u64,
+) -> [f64; 3] {
     let files = [a, b, blended].map(write_material);
     let [a, b, c] = files.each_ref().map(|file| open(file));
     let mut largest = [0.0f64; 3];
@@ -51,7 +68,8 @@ fn largest_difference(a: &MaterialModel, b: &MaterialModel, alpha: f64, blended:
         for channel in 0..3 {
             let (a, b, c) = (a[channel], b[channel], c[channel]);
             if [a, b, c].iter().all(|value| value.abs() < VALUE_BOUND) {
-                largest[channel] = largest[channel].max((a as f64 * (1.0 - alpha) + b as f64 * alpha - c as f64).abs());
+                largest[channel] =
+                    largest[channel].max((a as f64 * (1.0 - alpha) + b as f64 * alpha - c as f64).abs());
             }
         }
     }
@@ -65,7 +83,12 @@ fn varied(model: &MaterialModel, random: &mut Random) -> MaterialModel {
         channel.mean.iter_mut().for_each(|mean| mean.entries.iter_mut().for_each(|entry| *entry /= 2));
         let Some(ensemble) = &mut channel.ensemble else { continue };
         for dictionary in &mut ensemble.dictionaries {
-            dictionary.light.entries.iter_mut().chain(&mut dictionary.y.entries).for_each(|entry| *entry = entry.wrapping_neg());
+            dictionary
+                .light
+                .entries
+                .iter_mut()
+                .chain(&mut dictionary.y.entries)
+                .for_each(|entry| *entry = entry.wrapping_neg());
             dictionary.x.entries.reverse();
         }
         for record in ensemble.coefficients.iter_mut().flatten().flat_map(|layer| &mut layer.records) {
@@ -78,19 +101,27 @@ fn varied(model: &MaterialModel, random: &mut Random) -> MaterialModel {
     other
 }
 
-/// A bound, Q20, of what an exact blend loses in a channel: rounded quantisers and products of both, means, scales.
+/// A bound, Q20, of what an exact blend loses in a channel: rounded quantisers and products of both, means,
+/// scales.
 fn exact_bound(models: [&MaterialModel; 3], channel: usize) -> f64 {
     let of_ensemble = |ensemble: &EnsembleModel| {
         let of_layer = |layer: &selvedge_tools::model::CoefficientsModel| {
             let of_record = |record: &selvedge_tools::model::RecordModel| {
                 let atoms = &ensemble.atoms[record.dictionary as usize];
-                let parts = record.coefficients.iter().map(|c| 2.0 * 32_768.0 / 2f64.powi(atoms[c.0 as usize].shift as i32) + 2.0);
+                let parts = record
+                    .coefficients
+                    .iter()
+                    .map(|c| 2.0 * 32_768.0 / 2f64.powi(atoms[c.0 as usize].shift as i32) + 2.0);
                 parts.sum::<f64>() / 2f64.powi(record.shift as i32) + 1.0
             };
             layer.records.iter().map(of_record).fold(0.0, f64::max)
         };
         // Four blocks at most meet in a sample.
-        4.0 * ensemble.coefficients.iter().map(|level| level.iter().map(of_layer).sum::<f64>()).fold(0.0, f64::max)
+        4.0 * ensemble
+            .coefficients
+            .iter()
+            .map(|level| level.iter().map(of_layer).sum::<f64>())
+            .fold(0.0, f64::max)
     };
     models
         .iter()
@@ -106,7 +137,8 @@ fn exact_bound(models: [&MaterialModel; 3], channel: usize) -> f64 {
 /// The least shift of a channel's records that have coefficients.
 fn least_shift(model: &MaterialModel, channel: usize) -> u32 {
     let ensemble = model.channels[channel].ensemble.iter();
-    let records = ensemble.flat_map(|ensemble| ensemble.coefficients.iter().flatten()).flat_map(|c| &c.records);
+    let records =
+        ensemble.flat_map(|ensemble| ensemble.coefficients.iter().flatten()).flat_map(|c| &c.records);
     records.filter(|record| !record.coefficients.is_empty()).map(|record| record.shift).min().unwrap_or(31)
 }
 
@@ -214,7 +246,11 @@ fn shuffle(factor: &mut FactorModel, random: &mut Random) -> Vec<u32> {
     let mut order: Vec<usize> = (0..count).collect();
     (1..count).for_each(|i| order.swap(i, random.range(0, i as i64) as usize));
     let signs: Vec<i16> = (0..count).map(|_| random.pick(&[1, -1])).collect();
-    factor.entries = factor.entries.chunks(count).flat_map(|row| order.iter().zip(&signs).map(|(&i, sign)| row[i] * sign)).collect();
+    factor.entries = factor
+        .entries
+        .chunks(count)
+        .flat_map(|row| order.iter().zip(&signs).map(|(&i, sign)| row[i] * sign))
+        .collect();
     let mut places = vec![0; count];
     order.iter().enumerate().for_each(|(new, &old)| places[old] = new as u32);
     places
@@ -240,7 +276,13 @@ fn in_another_basis(model: &MaterialModel) -> MaterialModel {
             let mut new_position = vec![0; sorted.len()];
             (0u32..).zip(&sorted).for_each(|(new, (old, _))| new_position[*old as usize] = new);
             ensemble.atoms[k] = sorted.into_iter().map(|(_, atom)| atom).collect();
-            for record in ensemble.coefficients.iter_mut().flatten().flat_map(|layer| &mut layer.records).filter(|record| record.dictionary as usize == k) {
+            for record in ensemble
+                .coefficients
+                .iter_mut()
+                .flatten()
+                .flat_map(|layer| &mut layer.records)
+                .filter(|record| record.dictionary as usize == k)
+            {
                 record.coefficients.iter_mut().for_each(|c| c.0 = new_position[c.0 as usize]);
                 record.coefficients.sort_unstable();
             }
@@ -260,7 +302,8 @@ fn a_change_of_basis_within_a_span_loses_nothing() {
     let b = in_another_basis(&a);
     open(&write_material(&b));
     for alpha in [0.25, 0.5] {
-        let (blended, report) = blend(&a, &b, alpha, Blend { value_bits: Some(14), ..Blend::default() }).expect("alike");
+        let (blended, report) =
+            blend(&a, &b, alpha, Blend { value_bits: Some(14), ..Blend::default() }).expect("alike");
         let found = largest_difference(&a, &b, alpha, &blended, 2000);
         println!("alpha {alpha}: {found:?} of 2^20, {report:?}");
         assert!(report.changed > 0 && report.lost < report.energy * 1e-4);
@@ -283,15 +326,18 @@ fn the_stated_loss_is_that_of_decoded_values() {
         ensemble.coefficients.iter_mut().flatten().for_each(|layer| layer.records.reverse());
     }
     for most in [None, Some(12)] {
-        let (blended, report) = blend(&a, &b, 0.5, Blend { value_bits: Some(16), most, ..Blend::default() }).expect("alike");
+        let (blended, report) =
+            blend(&a, &b, 0.5, Blend { value_bits: Some(16), most, ..Blend::default() }).expect("alike");
         let files = [&a, &b, &blended].map(write_material);
         let [of_a, of_b, of_c] = files.each_ref().map(|file| open(file));
         let mut random = Random::new(1);
         let count = 300_000;
         let mut missed = 0.0;
         for _ in 0..count {
-            let [x, y, light, view] = [a.size[0], a.size[1], 151, 151].map(|n| random.range(0, n as i64 - 1) as u32);
-            let [p, q, r] = [of_a, of_b, of_c].map(|material| as_array(material.point_values(x, y, light, view)));
+            let [x, y, light, view] =
+                [a.size[0], a.size[1], 151, 151].map(|n| random.range(0, n as i64 - 1) as u32);
+            let [p, q, r] =
+                [of_a, of_b, of_c].map(|material| as_array(material.point_values(x, y, light, view)));
             missed += (0..3).map(|c| ((p[c] + q[c]) as f64 / 2.0 - r[c] as f64).powi(2)).sum::<f64>();
         }
         let samples = (a.size[0] * a.size[1]) as f64 * 151.0 * 151.0;
@@ -309,11 +355,13 @@ fn equal_dictionaries_add() {
     for ensemble in b.channels.iter_mut().filter_map(|channel| channel.ensemble.as_mut()) {
         ensemble.coefficients.iter_mut().flatten().for_each(|layer| layer.records.reverse());
     }
-    let (blended, report) = blend(&a, &b, 0.5, Blend { value_bits: Some(16), ..Blend::default() }).expect("alike");
+    let (blended, report) =
+        blend(&a, &b, 0.5, Blend { value_bits: Some(16), ..Blend::default() }).expect("alike");
     println!("{:?} of 2^20, {report:?}", largest_difference(&a, &b, 0.5, &blended, 1000));
     assert!(report.summed > 0);
     // With itself nothing changes but by rounding.
-    let (same, report) = blend(&a, &a, 0.3, Blend { value_bits: Some(16), ..Blend::default() }).expect("alike");
+    let (same, report) =
+        blend(&a, &a, 0.3, Blend { value_bits: Some(16), ..Blend::default() }).expect("alike");
     let found = largest_difference(&a, &a, 0.3, &same, 1000);
     println!("with itself: {found:?} of 2^20, {report:?}");
     assert!(report.changed == 0 && report.lost == 0.0 && found.iter().all(|&d| d < 200.0));
@@ -328,11 +376,16 @@ fn materials_that_differ_are_refused() {
     };
     refuse(MaterialModel { size: [99, 99], ..a.clone() }, "image sizes");
     refuse(MaterialModel { edge: a.edge % 16 + 1, ..a.clone() }, "block edges");
-    refuse(MaterialModel { lights: a.lights.iter().rev().chain([&[1, 1]]).copied().collect(), ..a.clone() }, "light directions");
+    refuse(
+        MaterialModel { lights: a.lights.iter().rev().chain([&[1, 1]]).copied().collect(), ..a.clone() },
+        "light directions",
+    );
     refuse(MaterialModel { matrix_q13: [1; 9], ..a.clone() }, "colour matrices");
     refuse(MaterialModel { cosine_included: !a.cosine_included, ..a.clone() }, "cosine flags");
     let other = match a.transfer {
-        TransferModel::Log2 { offset } => TransferModel::Log2 { offset: if offset == 0.5 { 0.25 } else { 0.5 } },
+        TransferModel::Log2 { offset } => {
+            TransferModel::Log2 { offset: if offset == 0.5 { 0.25 } else { 0.5 } }
+        }
         TransferModel::Linear { exponent } => TransferModel::Linear { exponent: exponent - 1 },
     };
     refuse(MaterialModel { transfer: other, ..a.clone() }, "log offsets or exponents");

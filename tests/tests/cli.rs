@@ -20,11 +20,16 @@ fn text(path: &Path) -> &str {
 fn import_validate_info_decode() {
     let folder = tempfile::tempdir().expect("folder");
     let excerpt = excerpt_folder();
-    let (file, png, exr) = (folder.path().join("a.selv"), folder.path().join("a.png"), folder.path().join("a.exr"));
+    let (file, png, exr) =
+        (folder.path().join("a.selv"), folder.path().join("a.png"), folder.path().join("a.exr"));
     assert_eq!(code(&["import", text(&excerpt), "--material", "felt05", "-o", text(&file)]), 0);
     let checked = run(&["validate", text(&file)]);
-    assert!(checked.status.success() && checked.stdout.is_empty() && checked.stderr.is_empty(), "silent when good");
-    let info: serde_json::Value = serde_json::from_slice(&run(&["info", "--json", text(&file)]).stdout).expect("JSON");
+    assert!(
+        checked.status.success() && checked.stdout.is_empty() && checked.stderr.is_empty(),
+        "silent when good"
+    );
+    let info: serde_json::Value =
+        serde_json::from_slice(&run(&["info", "--json", text(&file)]).stdout).expect("JSON");
     assert_eq!(info["size"], serde_json::json!([60, 60]));
     assert_eq!(info["name"], "felt05");
     assert_eq!(info["decode_digest"].as_str().map(str::len), Some(64));
@@ -37,14 +42,30 @@ fn import_validate_info_decode() {
 #[test]
 fn a_dictionary_of_its_own() {
     let folder = tempfile::tempdir().expect("folder");
-    let (file, dictionary, whole) = (folder.path().join("a.selv"), folder.path().join("a.selvdict"), folder.path().join("b.selv"));
+    let (file, dictionary, whole) =
+        (folder.path().join("a.selv"), folder.path().join("a.selvdict"), folder.path().join("b.selv"));
     let excerpt = excerpt_folder();
-    assert_eq!(code(&["import", text(&excerpt), "--material", "carpet07", "-o", text(&file), "--dictionary", text(&dictionary)]), 0);
+    assert_eq!(
+        code(&[
+            "import",
+            text(&excerpt),
+            "--material",
+            "carpet07",
+            "-o",
+            text(&file),
+            "--dictionary",
+            text(&dictionary)
+        ]),
+        0
+    );
     assert_eq!(code(&["import", text(&excerpt), "--material", "carpet07", "-o", text(&whole)]), 0);
     assert_eq!(code(&["validate", text(&file)]), 1, "the dictionary is missing");
     assert_eq!(code(&["validate", text(&file), "--dictionary", text(&dictionary)]), 0);
     assert_eq!(code(&["validate", text(&dictionary)]), 0);
-    let digest = |arguments: &[&str]| serde_json::from_slice::<serde_json::Value>(&run(arguments).stdout).expect("JSON")["decode_digest"].clone();
+    let digest = |arguments: &[&str]| {
+        serde_json::from_slice::<serde_json::Value>(&run(arguments).stdout).expect("JSON")["decode_digest"]
+            .clone()
+    };
     let split = digest(&["info", "--json", text(&file), "--dictionary", text(&dictionary)]);
     assert_eq!(split, digest(&["info", "--json", text(&whole)]));
 }
@@ -93,8 +114,17 @@ fn no_output_is_left_half_written() {
     }
     assert_eq!(code(&["import", text(&broken), "--material", "carpet07", "-o", text(&old)]), 3);
     assert_eq!(std::fs::read(&old).expect("still there"), b"precious");
-    assert_eq!(code(&["decode", text(&excerpt_folder().join("../carpet07-excerpt.selv")), "-o", text(&folder.path().join("picture.gif"))]), 1);
-    let names: Vec<_> = std::fs::read_dir(folder.path()).expect("folder").map(|e| e.expect("entry").file_name()).collect();
+    assert_eq!(
+        code(&[
+            "decode",
+            text(&excerpt_folder().join("../carpet07-excerpt.selv")),
+            "-o",
+            text(&folder.path().join("picture.gif"))
+        ]),
+        1
+    );
+    let names: Vec<_> =
+        std::fs::read_dir(folder.path()).expect("folder").map(|e| e.expect("entry").file_name()).collect();
     assert_eq!(names.len(), 2, "{names:?}");
 }
 
@@ -129,8 +159,11 @@ fn damaged_foreign_files_are_refused() {
                 damaged[at] = random.word() as u8;
             }
             std::fs::write(&path, &damaged).expect("write");
-            if let Ok(model) = selvedge_tools::sparsebtf::read_material(folder.path(), "carpet07", None).and_then(|m| m.to_model(8)) {
-                selvedge::open(&selvedge_tools::write::write_material(&model), &selvedge::Limits::NONE).expect("what is written is legal");
+            if let Ok(model) = selvedge_tools::sparsebtf::read_material(folder.path(), "carpet07", None)
+                .and_then(|m| m.to_model(8))
+            {
+                selvedge::open(&selvedge_tools::write::write_material(&model), &selvedge::Limits::NONE)
+                    .expect("what is written is legal");
             }
         }
         std::fs::write(&path, &bytes).expect("write");
@@ -152,7 +185,11 @@ fn the_kernel_is_translated() {
     ] {
         assert!(std::fs::read_to_string(folder.path().join(name)).expect(name).contains(sign), "{name}");
     }
-    assert!(!std::fs::read_to_string(folder.path().join("selvedge_functions.wgsl")).expect("WGSL").contains("@compute"));
+    assert!(
+        !std::fs::read_to_string(folder.path().join("selvedge_functions.wgsl"))
+            .expect("WGSL")
+            .contains("@compute")
+    );
 }
 
 /// From a model to a file and on, as a user would do it: every new command once, and its exit codes.
@@ -162,18 +199,31 @@ fn synth_train_encode_compare_trim_blend_export_import() {
     let at = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
     let (data, other, dictionary) = (at("checker.selvset"), at("other.selvset"), at("d.selvdict"));
     assert_eq!(code(&["synth", "checker", "--size", "12x10", "--samples", "1", "-o", &data]), 0);
-    assert_eq!(code(&["synth", "checker", "--size", "12x10", "--samples", "1", "--seed", "2", "-o", &other]), 0);
+    assert_eq!(
+        code(&["synth", "checker", "--size", "12x10", "--samples", "1", "--seed", "2", "-o", &other]),
+        0
+    );
     let again = at("again.selvset");
-    assert_eq!(code(&["synth", "checker", "--size", "12x10", "--samples", "1", "--threads", "1", "-o", &again]), 0);
-    assert!(std::fs::read(&data).expect("data") == std::fs::read(&again).expect("data"), "threads change no byte");
+    assert_eq!(
+        code(&["synth", "checker", "--size", "12x10", "--samples", "1", "--threads", "1", "-o", &again]),
+        0
+    );
+    assert!(
+        std::fs::read(&data).expect("data") == std::fs::read(&again).expect("data"),
+        "threads change no byte"
+    );
     assert_eq!(code(&["synth", "marble", "-o", &at("x")]), 1);
 
-    let training = ["--dictionaries", "2", "--edge", "4", "--iterations", "3", "--sparsity", "16,4,4", "--quiet"];
+    let training =
+        ["--dictionaries", "2", "--edge", "4", "--iterations", "3", "--sparsity", "16,4,4", "--quiet"];
     assert_eq!(code(&[["train", &other, "-o", &dictionary].as_slice(), &training].concat()), 0);
     // A training that is killed in the middle goes on to the same file.
     std::fs::create_dir(at("killed")).expect("a folder");
     let killed = at("killed/d.selvdict");
-    let mut child = Command::new(program()).args([["train", &other, "-o", &killed].as_slice(), &training].concat()).spawn().expect("runs");
+    let mut child = Command::new(program())
+        .args([["train", &other, "-o", &killed].as_slice(), &training].concat())
+        .spawn()
+        .expect("runs");
     let state = folder.path().join("killed/d.selvdict.training");
     while !state.exists() && child.try_wait().expect("a child").is_none() {
         std::thread::sleep(std::time::Duration::from_millis(1));
@@ -181,15 +231,27 @@ fn synth_train_encode_compare_trim_blend_export_import() {
     let _ = child.kill();
     let _ = child.wait();
     assert_eq!(code(&[["train", &other, "-o", &killed].as_slice(), &training].concat()), 0);
-    assert!(std::fs::read(&killed).expect("dictionary") == std::fs::read(&dictionary).expect("dictionary"), "the same file after all");
+    assert!(
+        std::fs::read(&killed).expect("dictionary") == std::fs::read(&dictionary).expect("dictionary"),
+        "the same file after all"
+    );
 
     let (own, trained, external) = (at("own.selv"), at("trained.selv"), at("external.selv"));
-    let report = run(&["encode", &data, "-o", &own, "--rmse", "0.7", "--edge", "4", "--layers", "2", "--levels", "2", "--json"]);
+    let report = run(&[
+        "encode", &data, "-o", &own, "--rmse", "0.7", "--edge", "4", "--layers", "2", "--levels", "2",
+        "--json",
+    ]);
     assert!(report.status.success());
     let report: serde_json::Value = serde_json::from_slice(&report.stdout).expect("JSON");
     assert!(report["metrics"]["log_rms"].as_f64().expect("a number") <= 0.7);
-    assert_eq!(code(&["encode", &data, "-o", &trained, "--dictionary", &dictionary, "--edge", "4", "--size", "70k"]), 0);
-    assert_eq!(code(&["encode", &data, "-o", &external, "--dictionary", &dictionary, "--external", "--size", "70k"]), 0);
+    assert_eq!(
+        code(&["encode", &data, "-o", &trained, "--dictionary", &dictionary, "--edge", "4", "--size", "70k"]),
+        0
+    );
+    assert_eq!(
+        code(&["encode", &data, "-o", &external, "--dictionary", &dictionary, "--external", "--size", "70k"]),
+        0
+    );
     assert_eq!(code(&["validate", &own, &trained]), 0);
     assert_eq!(code(&["validate", &external, "--dictionary", &dictionary]), 0);
     assert_eq!(code(&["encode", &data, "-o", &at("x.selv")]), 1, "a goal is missing");
@@ -198,18 +260,52 @@ fn synth_train_encode_compare_trim_blend_export_import() {
 
     assert_eq!(code(&["compare", &data, &data]), 0);
     let picture = at("compare.png");
-    assert_eq!(code(&["compare", &data, &own, "--by", "log-rms", "--fail", "0.7", "--warn", "0.7", "--picture", &picture]), 0);
+    assert_eq!(
+        code(&[
+            "compare",
+            &data,
+            &own,
+            "--by",
+            "log-rms",
+            "--fail",
+            "0.7",
+            "--warn",
+            "0.7",
+            "--picture",
+            &picture
+        ]),
+        0
+    );
     assert_eq!(code(&["compare", &data, &own, "--by", "log-rms", "--fail", "0.9", "--warn", "0.01"]), 1);
     assert_eq!(code(&["compare", &data, &own]), 2);
     assert_eq!(code(&["compare", &data, "does-not-exist"]), 4);
     assert_eq!(&std::fs::read(&picture).expect("png")[1..4], b"PNG");
 
     let (trimmed, blended) = (at("trimmed.selv"), at("blended.selv"));
-    assert_eq!(code(&["trim", &own, "-o", &trimmed, "--layers", "1", "--levels", "1", "--unused", "--channels", "texture,mean,mean", "--lights", "50"]), 0);
+    assert_eq!(
+        code(&[
+            "trim",
+            &own,
+            "-o",
+            &trimmed,
+            "--layers",
+            "1",
+            "--levels",
+            "1",
+            "--unused",
+            "--channels",
+            "texture,mean,mean",
+            "--lights",
+            "50"
+        ]),
+        0
+    );
     assert_eq!(code(&["validate", &trimmed]), 0);
     assert!(std::fs::metadata(&trimmed).expect("file").len() < std::fs::metadata(&own).expect("file").len());
     let second = at("second.selv");
-    let encode_alike = |data: &str, file: &str| code(&["encode", data, "-o", file, "--rmse", "0.7", "--edge", "4", "--offset", "0.001"]);
+    let encode_alike = |data: &str, file: &str| {
+        code(&["encode", data, "-o", file, "--rmse", "0.7", "--edge", "4", "--offset", "0.001"])
+    };
     assert_eq!((encode_alike(&data, &own), encode_alike(&other, &second)), (0, 0));
     assert_eq!(code(&["blend", &own, &second, "--alpha", "0.3", "-o", &blended]), 0);
     assert_eq!(code(&["blend", &own, &second, "--alpha", "0", "-o", &blended]), 0);
@@ -224,7 +320,11 @@ fn synth_train_encode_compare_trim_blend_export_import() {
     assert_eq!(code(&["compare", &small, &at("back.selvset")]), 0);
     assert_eq!(code(&["compare", &small, &data]), 3, "other sizes");
     // One image fewer, and the import says which is missing.
-    let gone = std::fs::read_dir(at("images")).expect("folder").filter_map(|e| e.ok()).map(|e| e.path()).find(|p| p.extension().is_some_and(|e| e == "exr"));
+    let gone = std::fs::read_dir(at("images"))
+        .expect("folder")
+        .filter_map(|e| e.ok())
+        .map(|e| e.path())
+        .find(|p| p.extension().is_some_and(|e| e == "exr"));
     std::fs::remove_file(gone.expect("an image")).expect("removed");
     assert_ne!(code(&["import", &at("images"), "-o", &at("broken.selvset")]), 0);
     assert!(!folder.path().join("broken.selvset").exists());

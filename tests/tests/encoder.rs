@@ -1,5 +1,5 @@
-//! From data to files: threads and interruptions change no byte, goals are met as decoded, bad data are refused or
-//! become a correct file.
+//! From data to files: threads and interruptions change no byte, goals are met as decoded, bad data are
+//! refused or become a correct file.
 
 use glam::DVec3;
 use selvedge::{Limits, Selvedge};
@@ -18,7 +18,14 @@ use std::path::Path;
 /// A small material with texture, relief and a highlight, of any size and number of directions.
 fn material(path: &Path, size: [usize; 2], directions: usize, scale: f32, seed: u64) -> Dataset {
     let set: Vec<DVec3> = directions::grid(81).expect("known")[..directions].to_vec();
-    let description = Description { size, lights: set.clone(), views: set.clone(), sample: Sample::Float, cosine_included: true, ..Description::default() };
+    let description = Description {
+        size,
+        lights: set.clone(),
+        views: set.clone(),
+        sample: Sample::Float,
+        cosine_included: true,
+        ..Description::default()
+    };
     let writer = Writer::create(path, description).expect("created");
     let mut random = Random::new(seed);
     for texel in 0..size[0] * size[1] {
@@ -49,12 +56,21 @@ fn open(bytes: &[u8]) -> Selvedge<'_> {
 
 fn measured(data: &Dataset, bytes: &[u8]) -> Metrics {
     let file = open(bytes);
-    compare(Source::Data(data), Source::File(&file, 0), data.description(), data.statistics().log_offset(), None, &|_, _| ()).expect("alike")
+    compare(
+        Source::Data(data),
+        Source::File(&file, 0),
+        data.description(),
+        data.statistics().log_offset(),
+        None,
+        &|_, _| (),
+    )
+    .expect("alike")
 }
 
 fn verified(data: &Dataset, wish: Wish, options: &Options) -> Verified {
     let prepared = prepare(vec![data], transfer(data), &|_, _| ()).expect("readable");
-    encode_verified(&prepared, &|edge| prepared.own_ensembles(edge), wish, options, &|_| ()).expect("reachable")
+    encode_verified(&prepared, &|edge| prepared.own_ensembles(edge), wish, options, &|_| ())
+        .expect("reachable")
 }
 
 fn with_threads<T: Send>(count: usize, work: impl FnOnce() -> T + Send) -> T {
@@ -62,12 +78,25 @@ fn with_threads<T: Send>(count: usize, work: impl FnOnce() -> T + Send) -> T {
 }
 
 fn small_training() -> train::Options {
-    train::Options { dictionaries: 3, sparsity: [12, 6, 6], edge: 4, subspace: 10, blocks: 20, iterations: 4, ..train::Options::default() }
+    train::Options {
+        dictionaries: 3,
+        sparsity: [12, 6, 6],
+        edge: 4,
+        subspace: 10,
+        blocks: 20,
+        iterations: 4,
+        ..train::Options::default()
+    }
 }
 
 fn dictionary_bytes(data: &Dataset, trained: &train::Trained, options: train::Options) -> Vec<u8> {
     let description = data.description();
-    let training = Training { lights: description.lights.clone(), views: description.views.clone(), options, ..Training::default() };
+    let training = Training {
+        lights: description.lights.clone(),
+        views: description.views.clone(),
+        options,
+        ..Training::default()
+    };
     dictionary_file::to_bytes(trained, &training, MetadataModel::default())
 }
 
@@ -76,7 +105,8 @@ fn threads_change_no_byte() {
     let folder = tempfile::tempdir().expect("a folder");
     let data = material(&folder.path().join("a"), [22, 19], 19, 1.0, 1);
     let run = || {
-        let trained = train(&[&data], &small_training(), None, &mut |_| true).expect("trained").expect("not stopped");
+        let trained =
+            train(&[&data], &small_training(), None, &mut |_| true).expect("trained").expect("not stopped");
         let prepared = prepare(vec![&data], transfer(&data), &|_, _| ()).expect("readable");
         let options = Options { edge: 4, goal: Goal::Rms(0.1), layers: 2, ..Options::default() };
         let encoded = encode(&prepared, &trained.ensembles, &options, &|_, _| ()).expect("encoded");
@@ -90,7 +120,8 @@ fn threads_change_no_byte() {
 fn a_stopped_training_goes_on_to_the_same_file() {
     let folder = tempfile::tempdir().expect("a folder");
     let data = material(&folder.path().join("a"), [20, 20], 19, 1.0, 2);
-    let whole = train(&[&data], &small_training(), None, &mut |_| true).expect("trained").expect("not stopped");
+    let whole =
+        train(&[&data], &small_training(), None, &mut |_| true).expect("trained").expect("not stopped");
     let state = folder.path().join("state");
     let mut runs = 0;
     let pieces = loop {
@@ -110,15 +141,31 @@ fn a_stopped_training_goes_on_to_the_same_file() {
     // A state is not continued by another training.
     let _ = train(&[&data], &small_training(), Some(&state), &mut |_| false).expect("trained");
     let other = train::Options { seed: 9, ..small_training() };
-    assert!(train(&[&data], &other, Some(&state), &mut |_| true).expect_err("refused").to_string().contains("another training"));
+    assert!(
+        train(&[&data], &other, Some(&state), &mut |_| true)
+            .expect_err("refused")
+            .to_string()
+            .contains("another training")
+    );
 }
 
 #[test]
 fn the_objective_never_rises_and_a_subspace_costs_little() {
     let folder = tempfile::tempdir().expect("a folder");
     let data = material(&folder.path().join("a"), [32, 32], 19, 1.0, 3);
-    let options = train::Options { dictionaries: 4, sparsity: [16, 8, 8], blocks: 60, iterations: 10, tolerance: 0.0, ..small_training() };
-    let run = |subspace| train(&[&data], &train::Options { subspace, ..options.clone() }, None, &mut |_| true).expect("trained").expect("not stopped");
+    let options = train::Options {
+        dictionaries: 4,
+        sparsity: [16, 8, 8],
+        blocks: 60,
+        iterations: 10,
+        tolerance: 0.0,
+        ..small_training()
+    };
+    let run = |subspace| {
+        train(&[&data], &train::Options { subspace, ..options.clone() }, None, &mut |_| true)
+            .expect("trained")
+            .expect("not stopped")
+    };
     let (fast, whole) = (run(14), run(19));
     for c in 0..3 {
         for trained in [&fast, &whole] {
@@ -142,9 +189,16 @@ fn goals_hold_as_decoded() {
         let v = verified(&data, Wish::LogRms(0.15), &options);
         let found = measured(&data, &v.encoded.bytes);
         assert!(found.log_rms <= 0.15 && found.log_rms > 0.13, "edge {edge}: {}", found.log_rms);
-        assert!((v.encoded.predicted_rms - found.log_rms).abs() < 0.03 * found.log_rms || 24 % edge.max(1) != 0, "edge {edge}");
+        assert!(
+            (v.encoded.predicted_rms - found.log_rms).abs() < 0.03 * found.log_rms || 24 % edge.max(1) != 0,
+            "edge {edge}"
+        );
         let v = verified(&data, Wish::Size(16_000), &options);
-        assert!(v.encoded.bytes.len() <= 16_000 && v.encoded.bytes.len() > 15_500, "edge {edge}: {}", v.encoded.bytes.len());
+        assert!(
+            v.encoded.bytes.len() <= 16_000 && v.encoded.bytes.len() > 15_500,
+            "edge {edge}: {}",
+            v.encoded.bytes.len()
+        );
     }
     let options = Options { edge: 4, ..Options::default() };
     let v = verified(&data, Wish::LinearRms(0.02), &options);
@@ -171,9 +225,12 @@ fn layers_and_levels_are_coarser_files() {
     let file = open(&encoded.bytes);
     assert_eq!((file.header().layer_count, file.header().level_count), (3, 3));
     let log_rms = |data: &Dataset, file: &Selvedge<'_>, level| {
-        compare(Source::Data(data), Source::File(file, level), data.description(), 1e-3, None, &|_, _| ()).expect("alike").log_rms
+        compare(Source::Data(data), Source::File(file, level), data.description(), 1e-3, None, &|_, _| ())
+            .expect("alike")
+            .log_rms
     };
-    let by_layers: Vec<f64> = (1..=3).map(|layers| log_rms(&data, &open(&encoded.bytes).with_layers(layers), 0)).collect();
+    let by_layers: Vec<f64> =
+        (1..=3).map(|layers| log_rms(&data, &open(&encoded.bytes).with_layers(layers), 0)).collect();
     assert!(by_layers[0] > by_layers[1] && by_layers[1] > by_layers[2], "{by_layers:?}");
     for (level, data) in (1..).zip(&coarser) {
         assert!(log_rms(data, &file, level) < 0.15, "level {level}");
@@ -183,8 +240,10 @@ fn layers_and_levels_are_coarser_files() {
 #[test]
 fn trained_dictionaries_serve_unseen_materials_inside_and_beside_the_file() {
     let folder = tempfile::tempdir().expect("a folder");
-    let [seen, unseen] = [6, 7].map(|seed| material(&folder.path().join(seed.to_string()), [24, 24], 19, 1.0, seed));
-    let trained = train(&[&seen], &small_training(), None, &mut |_| true).expect("trained").expect("not stopped");
+    let [seen, unseen] =
+        [6, 7].map(|seed| material(&folder.path().join(seed.to_string()), [24, 24], 19, 1.0, seed));
+    let trained =
+        train(&[&seen], &small_training(), None, &mut |_| true).expect("trained").expect("not stopped");
     let bytes = dictionary_bytes(&seen, &trained, small_training());
     let dictionary = dictionary_file::from_bytes(Path::new("d"), bytes.clone()).expect("legal");
     for (c, ensemble) in dictionary.ensembles.iter().enumerate() {
@@ -204,7 +263,14 @@ fn trained_dictionaries_serve_unseen_materials_inside_and_beside_the_file() {
         let options = Options { external: Some(bytes.as_slice().into()), ..options };
         let beside = encode(&prepared, &ensembles, &options, &|_, _| ()).expect("encoded");
         let file = selvedge::open_with(&beside.bytes, Some(&bytes), &Limits::NONE).expect("legal");
-        let found = compare(Source::Data(&unseen), Source::File(&file, 0), unseen.description(), unseen.statistics().log_offset(), None, &|_, _| ());
+        let found = compare(
+            Source::Data(&unseen),
+            Source::File(&file, 0),
+            unseen.description(),
+            unseen.statistics().log_offset(),
+            None,
+            &|_, _| (),
+        );
         let (inside, beside) = (measured(&unseen, &inside.bytes).log_rms, found.expect("alike").log_rms);
         assert!(inside < 0.14 && (inside - beside).abs() < 0.005, "edge {edge}: {inside} {beside}");
     }
@@ -225,7 +291,8 @@ fn odd_materials_become_correct_files() {
     ] {
         let data = material(&path, size, directions, scale, 8);
         for edge in [1, 4, 16] {
-            let prepared = prepare(vec![&data], transfer(&data), &|_, _| ()).unwrap_or_else(|error| panic!("{name}: {error}"));
+            let prepared = prepare(vec![&data], transfer(&data), &|_, _| ())
+                .unwrap_or_else(|error| panic!("{name}: {error}"));
             let ensembles = |edge| prepared.own_ensembles(edge);
             let options = Options { edge, ..Options::default() };
             let verified = encode_verified(&prepared, &ensembles, Wish::LogRms(0.05), &options, &|_| ());
@@ -239,7 +306,12 @@ fn odd_materials_become_correct_files() {
     let error = prepare(vec![&data], transfer(&data), &|_, _| ()).err().expect("refused").to_string();
     assert!(error.contains("beyond the format"), "{error}");
     // Constant: every number the same.
-    let description = Description { size: [6, 6], lights: vec![DVec3::Z; 1], views: vec![DVec3::Z; 1], ..Description::default() };
+    let description = Description {
+        size: [6, 6],
+        lights: vec![DVec3::Z; 1],
+        views: vec![DVec3::Z; 1],
+        ..Description::default()
+    };
     let writer = Writer::create(&path, description).expect("created");
     (0..36).for_each(|texel| writer.put(texel, 0, &[0.25, 0.5, 0.75]).expect("put"));
     writer.finish().expect("finished");
@@ -254,13 +326,26 @@ fn odd_materials_become_correct_files() {
 fn stiff_values_are_coded_in_both_domains() {
     let folder = tempfile::tempdir().expect("a folder");
     let set: Vec<DVec3> = directions::grid(81).expect("known")[..19].to_vec();
-    let description = Description { size: [12, 12], lights: set.clone(), views: set, sample: Sample::Float, ..Description::default() };
+    let description = Description {
+        size: [12, 12],
+        lights: set.clone(),
+        views: set,
+        sample: Sample::Float,
+        ..Description::default()
+    };
     let path = folder.path().join("stiff");
     let writer = Writer::create(&path, description).expect("created");
     let mut random = Random::new(3);
     for texel in 0..144 {
-        let values: Vec<f32> =
-            (0..19 * 19).flat_map(|pair| if pair % 20 == 0 && random.once_in(2) { [600.0, 550.0, 500.0] } else { [0.001, 0.0012, 0.0015] }).collect();
+        let values: Vec<f32> = (0..19 * 19)
+            .flat_map(|pair| {
+                if pair % 20 == 0 && random.once_in(2) {
+                    [600.0, 550.0, 500.0]
+                } else {
+                    [0.001, 0.0012, 0.0015]
+                }
+            })
+            .collect();
         writer.put(texel, 0, &values).expect("put");
     }
     writer.finish().expect("finished");
@@ -270,8 +355,14 @@ fn stiff_values_are_coded_in_both_domains() {
     let exponent = data.statistics().largest.log2().ceil() as i32 - 4;
     let prepared = prepare(vec![&data], TransferModel::Linear { exponent }, &|_, _| ()).expect("readable");
     let wish = Wish::LinearRms(1.0);
-    let linear =
-        encode_verified(&prepared, &|edge| prepared.own_ensembles(edge), wish, &Options { edge: 2, ..Options::default() }, &|_| ()).expect("reachable");
+    let linear = encode_verified(
+        &prepared,
+        &|edge| prepared.own_ensembles(edge),
+        wish,
+        &Options { edge: 2, ..Options::default() },
+        &|_| (),
+    )
+    .expect("reachable");
     assert!(measured(&data, &linear.encoded.bytes).linear_rms <= 1.0);
 }
 
@@ -280,8 +371,13 @@ fn goals_that_cannot_be_reached_are_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let data = material(&folder.path().join("a"), [8, 8], 7, 1.0, 9);
     let prepared = prepare(vec![&data], transfer(&data), &|_, _| ()).expect("readable");
-    let run = |options: Options| encode(&prepared, &prepared.own_ensembles(options.edge), &options, &|_, _| ()).map(|e| write::write_material(&e.model));
-    let few = run(Options { edge: 4, goal: Goal::Size(100), ..Options::default() }).expect_err("too small").to_string();
+    let run = |options: Options| {
+        encode(&prepared, &prepared.own_ensembles(options.edge), &options, &|_, _| ())
+            .map(|e| write::write_material(&e.model))
+    };
+    let few = run(Options { edge: 4, goal: Goal::Size(100), ..Options::default() })
+        .expect_err("too small")
+        .to_string();
     assert!(few.contains("too few"), "{few}");
     let cap = Options { edge: 4, goal: Goal::Rms(0.1), operations: Some(10), ..Options::default() };
     assert!(run(cap).expect_err("too few").to_string().contains("operations are too few"));

@@ -18,7 +18,10 @@ const DATASETS: [(&str, &str, &str); 4] =
 /// What is asked of each method.
 const GOALS: [(&str, &[&str]); 8] = [
     ("ensemble-size", &["--method", "sparse-ensemble", "--size", "60k", "--edge", "4"]),
-    ("ensemble-rmse", &["--method", "sparse-ensemble", "--rmse", "0.8", "--levels", "2", "--layers", "2", "--edge", "2"]),
+    (
+        "ensemble-rmse",
+        &["--method", "sparse-ensemble", "--rmse", "0.8", "--levels", "2", "--layers", "2", "--edge", "2"],
+    ),
     ("ensemble-psnr", &["--method", "sparse-ensemble", "--psnr", "27", "--transfer", "linear"]),
     ("ensemble-coefficients", &["--method", "sparse-ensemble", "--coefficients", "40,10,10", "--edge", "8"]),
     ("tensor-size", &["--method", "sparse-tensor", "--size", "80k", "--rank", "16"]),
@@ -60,7 +63,9 @@ fn read_table() -> BTreeMap<[String; 3], String> {
 }
 
 fn write_table(rows: &BTreeMap<[String; 3], String>) {
-    let mut text = String::from("# SHA-256 of datasets and of files that `selvedge encode` makes of them: processor, dataset, goal, digest\n");
+    let mut text = String::from(
+        "# SHA-256 of datasets and of files that `selvedge encode` makes of them: processor, dataset, goal, digest\n",
+    );
     for ([processor, dataset, goal], digest) in rows {
         text += &format!("{processor}\t{dataset}\t{goal}\t{digest}\n");
     }
@@ -91,7 +96,9 @@ fn encoders_write_the_bytes_that_they_wrote() {
     let regenerate = std::env::var("SELVEDGE_REGENERATE").is_ok_and(|text| text == "1");
     let mut table = read_table();
     if !regenerate && !table.keys().any(|[of, ..]| *of == processor) {
-        eprintln!("SKIPPED: NO DIGESTS OF ENCODERS ARE RECORDED FOR {processor}: SELVEDGE_REGENERATE=1 RECORDS THEM");
+        eprintln!(
+            "SKIPPED: NO DIGESTS OF ENCODERS ARE RECORDED FOR {processor}: SELVEDGE_REGENERATE=1 RECORDS THEM"
+        );
         return;
     }
     let mut found = BTreeMap::new();
@@ -103,7 +110,8 @@ fn encoders_write_the_bytes_that_they_wrote() {
         assert!(!data_differ, "{}: the data differ, so nothing can be said of the encoders", dataset.0);
         for (goal, options) in GOALS {
             let output = folder.path().join("encoded.selv");
-            let mut arguments = vec!["encode", path.to_str().expect("UTF-8"), "-o", output.to_str().expect("UTF-8")];
+            let mut arguments =
+                vec!["encode", path.to_str().expect("UTF-8"), "-o", output.to_str().expect("UTF-8")];
             arguments.extend(options);
             run(&arguments);
             found.insert(key(goal), digest_of(&output));
@@ -116,7 +124,8 @@ fn encoders_write_the_bytes_that_they_wrote() {
         write_table(&table);
         return;
     }
-    let differ: Vec<_> = found.iter().filter(|(key, digest)| table.get(*key) != Some(digest)).map(|(key, _)| key).collect();
+    let differ: Vec<_> =
+        found.iter().filter(|(key, digest)| table.get(*key) != Some(digest)).map(|(key, _)| key).collect();
     assert!(differ.is_empty(), "other bytes than recorded: {differ:?}");
     println!("{} files of {processor} have the bytes that are recorded", found.len());
 }

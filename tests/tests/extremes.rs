@@ -1,12 +1,14 @@
-//! The coverage list of the generator of legal but extreme files: the smallest and the largest of every field, and every branch of the
-//! reconstruction, are reached by some seed or by a file that is made for it.
+//! The coverage list of the generator of legal but extreme files: the smallest and the largest of every
+//! field, and every branch of the reconstruction, are reached by some seed or by a file that is made for it.
 
 use selvedge::direction::hull_start;
 use selvedge::ensemble::{coefficients_start, read_record};
 use selvedge::words::word;
 use selvedge::{Direction, Limits, Selvedge};
 use selvedge_tools::extreme::{extreme_model, extreme_tensor};
-use selvedge_tools::model::{AtomModel, CoefficientsModel, FactorModel, MaterialModel, RecordModel, TransferModel};
+use selvedge_tools::model::{
+    AtomModel, CoefficientsModel, FactorModel, MaterialModel, RecordModel, TransferModel,
+};
 use selvedge_tools::random::Random;
 use selvedge_tools::write::{write_material, write_split};
 use std::collections::BTreeSet;
@@ -152,7 +154,11 @@ fn of_model(model: &MaterialModel, seen: &mut BTreeSet<String>) {
             for dictionary in &ensemble.dictionaries {
                 for factor in [&dictionary.light, &dictionary.view, &dictionary.x, &dictionary.y] {
                     add("columns", factor.columns as i64);
-                    factor.entries.iter().filter(|e| e.abs() == 32_767).for_each(|&e| add("factor entry", e as i64));
+                    factor
+                        .entries
+                        .iter()
+                        .filter(|e| e.abs() == 32_767)
+                        .for_each(|&e| add("factor entry", e as i64));
                 }
             }
             for list in &ensemble.atoms {
@@ -213,7 +219,11 @@ fn of_model(model: &MaterialModel, seen: &mut BTreeSet<String>) {
 }
 
 /// What a sparse tensor has and its samples reach.
-fn of_tensor(tensor: &selvedge_tools::model::TensorModel, material: &Selvedge<'_>, seen: &mut BTreeSet<String>) {
+fn of_tensor(
+    tensor: &selvedge_tools::model::TensorModel,
+    material: &Selvedge<'_>,
+    seen: &mut BTreeSet<String>,
+) {
     use selvedge::tensor::{angular_q15, layer_q20, list_coefficient, list_low_bits};
     let mut say = |holds: bool, what: &str| {
         if holds {
@@ -259,20 +269,38 @@ fn of_tensor(tensor: &selvedge_tools::model::TensorModel, material: &Selvedge<'_
             let low_bits = list_low_bits(atom_bits, list.len() as u32);
             say(!list.is_empty() && low_bits == 0, "list low bits: 0");
             say(!list.is_empty() && low_bits == 9, "list low bits: 9");
-            let part =
-                |&(atom, value): &(u32, u16)| list_coefficient(value as u32, layer.value_bits).unsigned_abs().div_ceil(1 << tensor.atoms[atom as usize].gain);
+            let part = |&(atom, value): &(u32, u16)| {
+                list_coefficient(value as u32, layer.value_bits)
+                    .unsigned_abs()
+                    .div_ceil(1 << tensor.atoms[atom as usize].gain)
+            };
             say(list.iter().map(part).sum::<u32>() == 65_534, "list sum: 65534");
         }
     }
     let (words, m) = (material.words(), material.material());
     let mut random = Random::new(tensor.fibres.len() as u64);
     for _ in 0..10 {
-        let mut direction = || Direction { x_q18: random.range(-262_144, 262_144) as i32, y_q18: random.range(-262_144, 262_144) as i32, z_q15: 9 };
+        let mut direction = || Direction {
+            x_q18: random.range(-262_144, 262_144) as i32,
+            y_q18: random.range(-262_144, 262_144) as i32,
+            z_q15: 9,
+        };
         let (light, view) = (material.locate_light(direction()), material.locate_view(direction()));
         let angular = angular_q15(words, m, 0, tensor.atoms[0].angular, light, view);
         say([angular.c0, angular.c1, angular.c2].iter().any(|c| c.abs() == 32_767), "ABRDF atom: limited");
-        let axis = |size: u32, at: u32| selvedge::position::axis_at_position(m.edge, m.edge_reciprocal_q18, size, at);
-        let texture = layer_q20(words, m, 0, 0, axis(m.width, random.word()), axis(m.height, random.word()), light, view);
+        let axis = |size: u32, at: u32| {
+            selvedge::position::axis_at_position(m.edge, m.edge_reciprocal_q18, size, at)
+        };
+        let texture = layer_q20(
+            words,
+            m,
+            0,
+            0,
+            axis(m.width, random.word()),
+            axis(m.height, random.word()),
+            light,
+            view,
+        );
         say([texture.c0, texture.c1, texture.c2].iter().any(|c| c.abs() == 1 << 27), "layer: limited");
     }
 }
@@ -308,7 +336,11 @@ fn of_samples(material: &Selvedge<'_>, seen: &mut BTreeSet<String>, seed: u64) {
         let taps = material.locate_light(asked);
         let hull = word(words, m.light_start + 2);
         say(taps.weight_c_q15 > 0, "taps: triangle");
-        say(hull > 0 && taps.a != taps.b && taps.a == taps.c || hull > 0 && taps.weight_c_q15 == 0 && taps.weight_b_q15 > 0, "taps: hull edge");
+        say(
+            hull > 0 && taps.a != taps.b && taps.a == taps.c
+                || hull > 0 && taps.weight_c_q15 == 0 && taps.weight_b_q15 > 0,
+            "taps: hull edge",
+        );
         say(hull > 0 && taps.a == taps.b && hull_start(words, m.light_start) > 0, "taps: hull corner");
         say(hull == 0, "taps: one direction");
         say(taps.cosine_q15 == 0, "cosine: below the horizon");
@@ -328,15 +360,24 @@ fn of_samples(material: &Selvedge<'_>, seen: &mut BTreeSet<String>, seed: u64) {
         say(rgb.contains(&0), "result: zero");
         say(rgb.contains(&0x7f7f_ffff), "result: largest");
         if m.level_count > 1 {
-            let (fine, half) = (material.trilinear(0, u, 7, asked, view), material.trilinear(0x8000, u, 7, asked, view));
+            let (fine, half) =
+                (material.trilinear(0, u, 7, asked, view), material.trilinear(0x8000, u, 7, asked, view));
             say(fine != half, "between levels");
         }
-        for (c, channel) in m.channels.iter().enumerate().filter(|(_, channel)| channel.state == 2 && channel.atoms_start != 0) {
-            let (x, y) = (axis, selvedge::position::axis_at_position(m.edge, m.edge_reciprocal_q18, m.height, 7));
+        for (c, channel) in m
+            .channels
+            .iter()
+            .enumerate()
+            .filter(|(_, channel)| channel.state == 2 && channel.atoms_start != 0)
+        {
+            let (x, y) =
+                (axis, selvedge::position::axis_at_position(m.edge, m.edge_reciprocal_q18, m.height, 7));
             let block = y.first.block * selvedge::position::block_count(&m, m.width) + x.first.block;
             let record = read_record(words, coefficients_start(words, &m, *channel, 0, 0), block);
             if record.count > 0 && c < 3 {
-                let texture = selvedge::ensemble::record_q20(words, *channel, record, x.first, y.first, taps, view_taps);
+                let texture = selvedge::ensemble::record_q20(
+                    words, *channel, record, x.first, y.first, taps, view_taps,
+                );
                 say(texture.abs() == 1 << 25, "record: limited");
             }
         }
@@ -357,14 +398,24 @@ fn made() -> Vec<MaterialModel> {
             vec![CoefficientsModel { value_bits: 4, records: vec![RecordModel::default()] }],
         ]
     };
-    // 1,024 columns of light and 64 of view: 65,536 atoms, of which the last alone is used, then sixteen far apart.
-    let atoms: Vec<AtomModel> = (0..65_536).map(|i| AtomModel { light: i / 64, view: i % 64, step: 65_534, base: -32_767, ..AtomModel::default() }).collect();
+    // 1,024 columns of light and 64 of view: 65,536 atoms, of which the last alone is used, then sixteen far
+    // apart.
+    let atoms: Vec<AtomModel> = (0..65_536)
+        .map(|i| AtomModel {
+            light: i / 64,
+            view: i % 64,
+            step: 65_534,
+            base: -32_767,
+            ..AtomModel::default()
+        })
+        .collect();
     let crowd = |coefficients: Vec<(u32, u16)>| {
         ensemble_of(&|e| {
             e.dictionaries[0].light = FactorModel { columns: 1024, entries: vec![1; 5 * 1024] };
             e.dictionaries[0].view = FactorModel { columns: 64, entries: vec![1; 5 * 64] };
             e.atoms[0].clone_from(&atoms);
-            e.coefficients = only(RecordModel { dictionary: 0, shift: 3, coefficients: coefficients.clone() });
+            e.coefficients =
+                only(RecordModel { dictionary: 0, shift: 3, coefficients: coefficients.clone() });
         })
     };
     let mut deep = example();
@@ -380,15 +431,26 @@ fn made() -> Vec<MaterialModel> {
     many.level_count = 1;
     // 32,767 + 32,767 + 1: the largest sum that a record may have.
     let full = ensemble_of(&|e| {
-        e.atoms[0].iter_mut().zip([-32_767i16, -32_767, 1]).for_each(|(atom, base)| (atom.base, atom.step, atom.shift) = (base, 0, 0));
-        e.coefficients = only(RecordModel { dictionary: 0, shift: 0, coefficients: vec![(0, 0), (1, 0), (2, 0)] });
+        e.atoms[0]
+            .iter_mut()
+            .zip([-32_767i16, -32_767, 1])
+            .for_each(|(atom, base)| (atom.base, atom.step, atom.shift) = (base, 0, 0));
+        e.coefficients =
+            only(RecordModel { dictionary: 0, shift: 0, coefficients: vec![(0, 0), (1, 0), (2, 0)] });
     });
     // A second dictionary, which has no atoms.
     let empty = ensemble_of(&|e| {
         e.dictionaries.push(e.dictionaries[0].clone());
         e.atoms.push(Vec::new());
     });
-    vec![empty, crowd(vec![(65_535, 8)]), crowd((0..16).map(|i| (i * 4096 + 4095, 8)).collect()), deep, many, full]
+    vec![
+        empty,
+        crowd(vec![(65_535, 8)]),
+        crowd((0..16).map(|i| (i * 4096 + 4095, 8)).collect()),
+        deep,
+        many,
+        full,
+    ]
 }
 
 #[test]
@@ -398,23 +460,33 @@ fn the_list_is_covered() {
     for (seed, model) in (0u64..).zip(models) {
         of_model(&model, &mut seen);
         let file = write_material(&model);
-        let material = selvedge::open(&file, &Limits::NONE).unwrap_or_else(|finding| panic!("{seed}: {finding}"));
+        let material =
+            selvedge::open(&file, &Limits::NONE).unwrap_or_else(|finding| panic!("{seed}: {finding}"));
         of_samples(&material, &mut seen, seed);
         let ensembles = model.channels.iter().filter_map(|channel| channel.ensemble.as_ref());
         for ensemble in ensembles {
             let sum = |record: &RecordModel, bits: u32| -> u32 {
                 let of = |&(position, value): &(u32, u16)| {
                     let atom = &ensemble.atoms[record.dictionary as usize][position as usize];
-                    selvedge::ensemble::dequantise(atom.quantiser(), value as u32, bits).unsigned_abs().div_ceil(1 << atom.shift)
+                    selvedge::ensemble::dequantise(atom.quantiser(), value as u32, bits)
+                        .unsigned_abs()
+                        .div_ceil(1 << atom.shift)
                 };
                 record.coefficients.iter().map(of).sum()
             };
-            for (record, bits) in ensemble.coefficients.iter().flatten().flat_map(|c| c.records.iter().map(|record| (record, c.value_bits))) {
+            for (record, bits) in ensemble
+                .coefficients
+                .iter()
+                .flatten()
+                .flat_map(|c| c.records.iter().map(|record| (record, c.value_bits)))
+            {
                 if sum(record, bits) == 65_535 {
                     seen.insert("record sum: 65535".into());
                 }
                 // A window of the high parts is 32 bits; a gap of more than that many zeros needs a second.
-                if record.coefficients.windows(2).any(|pair| pair[1].0 - pair[0].0 > 4096 * 32) || record.coefficients.first().is_some_and(|c| c.0 >> 12 >= 8) {
+                if record.coefficients.windows(2).any(|pair| pair[1].0 - pair[0].0 > 4096 * 32)
+                    || record.coefficients.first().is_some_and(|c| c.0 >> 12 >= 8)
+                {
                     seen.insert("high parts over a window".into());
                 }
             }
@@ -425,7 +497,10 @@ fn the_list_is_covered() {
         if (seed < 40 || model.tensor.is_some() && seed % 4 == 0) && model.has_texture() {
             let (split, dictionary) = write_split(&model);
             selvedge::open_with(&split, Some(&dictionary), &Limits::NONE).expect("legal");
-            seen.insert(if model.tensor.is_some() { "tensor: external dictionary" } else { "external dictionary" }.into());
+            seen.insert(
+                if model.tensor.is_some() { "tensor: external dictionary" } else { "external dictionary" }
+                    .into(),
+            );
         }
     }
     let missing: Vec<_> = LIST.iter().filter(|item| !seen.contains(**item)).collect();

@@ -37,7 +37,8 @@ fn random_bytes_pass() {
 fn targets_reach_legal_files() {
     let mut legal = 0;
     for vector in targets::suite() {
-        let dictionary = vector.dictionary.as_ref().and_then(|path| targets::suite().iter().find(|v| v.path == *path));
+        let dictionary =
+            vector.dictionary.as_ref().and_then(|path| targets::suite().iter().find(|v| v.path == *path));
         legal += targets::open_and_sample(&vector.bytes, dictionary.map(|d| &d.bytes[..])) as usize;
     }
     assert!(legal >= 30, "{legal}");

@@ -1,5 +1,5 @@
-//! Bad files beyond the conformance suite: truncations, flipped bits and absurd values give a typed error or a legal file,
-//! never a panic.
+//! Bad files beyond the conformance suite: truncations, flipped bits and absurd values give a typed error or
+//! a legal file, never a panic.
 
 use selvedge::{Finding, First, Limits};
 use selvedge_tests::setting;
@@ -35,8 +35,11 @@ fn open_and_use(file: &[u8], dictionary: Option<&[u8]>) -> Option<Finding> {
         Ok(material) => {
             let mut random = Random::new(file.len() as u64);
             for _ in 0..4 {
-                let mut direction =
-                    || selvedge::Direction { x_q18: random.word() as i32, y_q18: random.range(-262_144, 262_144) as i32, z_q15: random.word() as i32 };
+                let mut direction = || selvedge::Direction {
+                    x_q18: random.word() as i32,
+                    y_q18: random.range(-262_144, 262_144) as i32,
+                    z_q15: random.word() as i32,
+                };
                 let (light, view) = (direction(), direction());
                 material.trilinear(random.word() >> 12, random.word(), random.word(), light, view);
                 material.point(random.word(), random.word() >> 22, random.word(), random.word() >> 22);
@@ -89,7 +92,19 @@ fn absurd_values_in_every_field() {
         for at in (0..file.len() / 4).filter(|at| *at < 512 || at % step == 0).map(|at| at * 4) {
             let old = word(&file, at);
             let any = random.word();
-            for value in [0, 1, old.wrapping_add(1), old.wrapping_sub(1), 0x7fff_ffff, 0x8000_0000, 0xffff_ffff, 0x8000, 0xffff, any, old ^ 0x8000_8000] {
+            for value in [
+                0,
+                1,
+                old.wrapping_add(1),
+                old.wrapping_sub(1),
+                0x7fff_ffff,
+                0x8000_0000,
+                0xffff_ffff,
+                0x8000,
+                0xffff,
+                any,
+                old ^ 0x8000_8000,
+            ] {
                 let mut changed = file.clone();
                 set_word(&mut changed, at, value);
                 repair_checksums(&mut changed);
@@ -104,7 +119,11 @@ fn absurd_values_in_every_field() {
 fn random_damage() {
     let mut legal = 0;
     let count = setting("SELVEDGE_DAMAGE", 30_000);
-    let files: Vec<Vec<u8>> = (0..40).map(|seed| write_material(&extreme_of_any_method(seed))).filter(|file| file.len() < 40_000).chain([example()]).collect();
+    let files: Vec<Vec<u8>> = (0..40)
+        .map(|seed| write_material(&extreme_of_any_method(seed)))
+        .filter(|file| file.len() < 40_000)
+        .chain([example()])
+        .collect();
     let mut random = Random::new(11);
     for i in 0..count {
         let mut file = files[i % files.len()].clone();

@@ -19,7 +19,10 @@ fn adapter(backends: &str) -> Option<Gpu> {
         Some(gpu) => println!("{backends}: {}", gpu.description),
         None => {
             eprintln!("SKIPPED: NO {} ADAPTER: THE KERNEL WAS NOT RUN ON IT", backends.to_uppercase());
-            assert!(std::env::var_os("SELVEDGE_REQUIRE_GPU").is_none() || backends != "vulkan", "SELVEDGE_REQUIRE_GPU is set");
+            assert!(
+                std::env::var_os("SELVEDGE_REQUIRE_GPU").is_none() || backends != "vulkan",
+                "SELVEDGE_REQUIRE_GPU is set"
+            );
         }
     }
     gpu
@@ -42,13 +45,18 @@ fn extreme_files() -> Vec<(Vec<u8>, Vec<u8>)> {
     let split = |seed: u64| {
         let model = extreme_of_any_method(seed);
         let has_texture = model.has_texture();
-        if seed % 5 == 0 && has_texture { write::write_split(&model) } else { (write::write_material(&model), Vec::new()) }
+        if seed % 5 == 0 && has_texture {
+            write::write_split(&model)
+        } else {
+            (write::write_material(&model), Vec::new())
+        }
     };
     let suite = selvedge_tests::targets::suite();
-    let of_suite = suite.iter().filter(|v| matches!(v.answer, selvedge_tools::vectors::Answer::Digest(_))).map(|v| {
-        let dictionary = v.dictionary.as_ref().and_then(|path| suite.iter().find(|d| d.path == *path));
-        (v.bytes.clone(), dictionary.map_or(Vec::new(), |d| d.bytes.clone()))
-    });
+    let of_suite =
+        suite.iter().filter(|v| matches!(v.answer, selvedge_tools::vectors::Answer::Digest(_))).map(|v| {
+            let dictionary = v.dictionary.as_ref().and_then(|path| suite.iter().find(|d| d.path == *path));
+            (v.bytes.clone(), dictionary.map_or(Vec::new(), |d| d.bytes.clone()))
+        });
     (0..EXTREME_FILES).map(split).chain(of_suite).collect()
 }
 
@@ -67,20 +75,38 @@ fn extreme_query(random: &mut Random, entry: &str, material: u32) -> Query {
     }
     let mut word = || {
         let any = random.word();
-        random.pick(&[any, any >> 17, any >> 8, 0, u32::MAX, 0x8000_0000, 0x3f80_0000, 0x7f80_0000, 262_144, 0u32.wrapping_sub(262_144)])
+        random.pick(&[
+            any,
+            any >> 17,
+            any >> 8,
+            0,
+            u32::MAX,
+            0x8000_0000,
+            0x3f80_0000,
+            0x7f80_0000,
+            262_144,
+            0u32.wrapping_sub(262_144),
+        ])
     };
     let mut three = || [word(), word(), word()];
     let (light, view, [u, v, level_q16]) = (three(), three(), three());
     Query { material, u, v, level_q16, light, view }
 }
 
-fn compare(gpu: &Gpu, files: &[(Vec<u8>, Vec<u8>)], samples: usize, what: &str, query: impl Fn(&mut Random, &str, u32) -> Query) {
+fn compare(
+    gpu: &Gpu,
+    files: &[(Vec<u8>, Vec<u8>)],
+    samples: usize,
+    what: &str,
+    query: impl Fn(&mut Random, &str, u32) -> Query,
+) {
     let materials = open(files);
     let loaded = gpu.load(&materials);
     for entry in ENTRIES {
         let mut random = Random::new(0xe0 + entry.len() as u64);
         // Neighbouring invocations share a material, as in a renderer.
-        let queries: Vec<Query> = (0..samples).map(|i| query(&mut random, entry, (i * materials.len() / samples) as u32)).collect();
+        let queries: Vec<Query> =
+            (0..samples).map(|i| query(&mut random, entry, (i * materials.len() / samples) as u32)).collect();
         let answers = gpu.answer(&loaded, entry, &queries).expect("answers");
         let mut lit = 0usize;
         for (query, answer) in queries.iter().zip(&answers) {
@@ -104,7 +130,12 @@ fn compare(gpu: &Gpu, files: &[(Vec<u8>, Vec<u8>)], samples: usize, what: &str, 
             z_q15: random.range(0, 32_768) as i32,
         };
         let (light, view) = (direction(), direction());
-        let query = Query { material: (number % materials.len()) as u32, light: direction_words(light), view: direction_words(view), ..Query::default() };
+        let query = Query {
+            material: (number % materials.len()) as u32,
+            light: direction_words(light),
+            view: direction_words(view),
+            ..Query::default()
+        };
         let answers = gpu.image(&loaded, query, size).expect("image");
         let mut scratch = vec![0; material.image_scratch_len()];
         let mut image = vec![selvedge::Rgb::default(); answers.len()];
@@ -114,13 +145,18 @@ fn compare(gpu: &Gpu, files: &[(Vec<u8>, Vec<u8>)], samples: usize, what: &str, 
             material.decode_channel(channel, 0, light, view, &mut scratch, values).expect("buffers fit");
         }
         for (i, answer) in answers.iter().enumerate() {
-            let wanted = Answer { rgb: image[i].to_words(), values: [values[0][i], values[1][i], values[2][i]] };
+            let wanted =
+                Answer { rgb: image[i].to_words(), values: [values[0][i], values[1][i], values[2][i]] };
             assert_eq!(wanted, *answer, "{what} image {number} texel {i}");
         }
         texels += answers.len();
         number += 1;
         // Small images cost a dispatch each: enough of them is enough.
-        if number >= 20 * materials.len() && texels >= samples / 50 && what == "extreme" && std::env::var_os("SELVEDGE_SAMPLES").is_none() {
+        if number >= 20 * materials.len()
+            && texels >= samples / 50
+            && what == "extreme"
+            && std::env::var_os("SELVEDGE_SAMPLES").is_none()
+        {
             break;
         }
     }

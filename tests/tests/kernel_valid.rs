@@ -11,13 +11,20 @@ fn parse(source: &str) -> naga::Module {
 
 #[test]
 fn every_assembly_is_valid_without_extra_capabilities() {
-    for (entries, methods) in [false, true].into_iter().flat_map(|entries| [&[], &ALL[..1], &ALL[1..], ALL].map(|methods| (entries, methods))) {
+    for (entries, methods) in [false, true]
+        .into_iter()
+        .flat_map(|entries| [&[], &ALL[..1], &ALL[1..], ALL].map(|methods| (entries, methods)))
+    {
         let module = parse(&assemble(&Request { methods, entries }));
         Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module).expect("valid");
         assert_eq!(module.entry_points.len(), if entries { 5 } else { 0 });
         // What is not asked for is not there.
-        let has = |name: &str| module.functions.iter().any(|(_, function)| function.name.as_deref() == Some(name));
-        assert_eq!((has("record_q20"), has("layer_q20")), (methods.contains(&Method::SparseEnsemble), methods.contains(&Method::SparseTensor)));
+        let has =
+            |name: &str| module.functions.iter().any(|(_, function)| function.name.as_deref() == Some(name));
+        assert_eq!(
+            (has("record_q20"), has("layer_q20")),
+            (methods.contains(&Method::SparseEnsemble), methods.contains(&Method::SparseTensor))
+        );
     }
 }
 
@@ -25,10 +32,15 @@ fn every_assembly_is_valid_without_extra_capabilities() {
 fn offences(function: &naga::Function) -> Vec<String> {
     let name = function.name.clone().unwrap_or_default();
     let bad = function.expressions.iter().filter_map(|(_, expression)| match expression {
-        naga::Expression::Binary { op: naga::BinaryOperator::Divide | naga::BinaryOperator::Modulo, .. } => Some("divides"),
-        naga::Expression::Literal(naga::Literal::F32(_) | naga::Literal::F64(_) | naga::Literal::F16(_) | naga::Literal::AbstractFloat(_)) => {
-            Some("has a float")
-        }
+        naga::Expression::Binary {
+            op: naga::BinaryOperator::Divide | naga::BinaryOperator::Modulo, ..
+        } => Some("divides"),
+        naga::Expression::Literal(
+            naga::Literal::F32(_)
+            | naga::Literal::F64(_)
+            | naga::Literal::F16(_)
+            | naga::Literal::AbstractFloat(_),
+        ) => Some("has a float"),
         naga::Expression::As { kind: naga::ScalarKind::Float, .. } => Some("converts to float"),
         _ => None,
     });
@@ -36,11 +48,14 @@ fn offences(function: &naga::Function) -> Vec<String> {
 }
 
 fn integer_only(module: &naga::Module) -> Vec<String> {
-    let mut found: Vec<String> = module.functions.iter().flat_map(|(_, function)| offences(function)).collect();
+    let mut found: Vec<String> =
+        module.functions.iter().flat_map(|(_, function)| offences(function)).collect();
     found.extend(module.entry_points.iter().flat_map(|entry| offences(&entry.function)));
     for (_, ty) in module.types.iter() {
         let scalar = match ty.inner {
-            naga::TypeInner::Scalar(scalar) | naga::TypeInner::Vector { scalar, .. } | naga::TypeInner::Matrix { scalar, .. } => scalar,
+            naga::TypeInner::Scalar(scalar)
+            | naga::TypeInner::Vector { scalar, .. }
+            | naga::TypeInner::Matrix { scalar, .. } => scalar,
             _ => continue,
         };
         if scalar.kind == naga::ScalarKind::Float {
@@ -60,8 +75,11 @@ fn the_kernel_has_no_float_and_no_division() {
 #[test]
 fn planted_offences_are_found() {
     let source = assemble(&Request { methods: ALL, entries: true });
-    for planted in ["fn bad(a: i32) -> i32 { return a / 3; }", "fn bad(a: u32) -> u32 { return a % 3u; }", "fn bad(a: u32) -> f32 { return bitcast<f32>(a); }"]
-    {
+    for planted in [
+        "fn bad(a: i32) -> i32 { return a / 3; }",
+        "fn bad(a: u32) -> u32 { return a % 3u; }",
+        "fn bad(a: u32) -> f32 { return bitcast<f32>(a); }",
+    ] {
         let module = parse(&format!("{source}\n{planted}"));
         assert!(!integer_only(&module).is_empty(), "{planted}");
     }

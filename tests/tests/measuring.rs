@@ -50,8 +50,14 @@ fn a_report_has_every_method_and_goes_on_where_it_was() {
         // A dozen texels a side: some budgets are below what a method's tables take, which the run says.
         assert!(!of.is_empty() || method.starts_with("SparseBTF"), "{method}");
         for line in of {
-            let number = |path: &str| line.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{method}: {path}"));
-            assert!(number("/bytes") > 0.0 && number("/speed/random/median") > 0.0 && number("/operations/mean") > 100.0);
+            let number = |path: &str| {
+                line.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{method}: {path}"))
+            };
+            assert!(
+                number("/bytes") > 0.0
+                    && number("/speed/random/median") > 0.0
+                    && number("/operations/mean") > 100.0
+            );
             assert!(number("/metrics/linear_rms") > 0.0 || method == "uncompressed");
             assert!((-1.0..=1.0).contains(&number("/ssim")) && (0.0..=1.0).contains(&number("/flip")));
             if let Some(stated) = line["operations"]["stated"].as_f64() {
@@ -60,8 +66,17 @@ fn a_report_has_every_method_and_goes_on_where_it_was() {
         }
     }
     // The uncompressed data lose nothing but between directions that they do not have.
-    let whole = json["held_out"].as_array().expect("lines").iter().find(|line| line["method"] == "uncompressed").expect("held out").clone();
-    assert!(whole["seen"]["linear_rms"] == 0.0 && whole["unseen"]["linear_rms"].as_f64().is_some_and(|e| e > 0.0), "{whole}");
+    let whole = json["held_out"]
+        .as_array()
+        .expect("lines")
+        .iter()
+        .find(|line| line["method"] == "uncompressed")
+        .expect("held out")
+        .clone();
+    assert!(
+        whole["seen"]["linear_rms"] == 0.0 && whole["unseen"]["linear_rms"].as_f64().is_some_and(|e| e > 0.0),
+        "{whole}"
+    );
     let html = read("report.html");
     assert!(html.contains("<svg") && html.contains("data:image/png;base64,") && !html.contains("<script"));
     assert_eq!(read("report.csv").lines().count(), all.len() + 1);
@@ -74,7 +89,12 @@ fn a_report_has_every_method_and_goes_on_where_it_was() {
     std::fs::write(out.join("measured.jsonl"), format!("{kept}{{\"key\":")).expect("written");
     succeed(&arguments);
     let again = read("measured.jsonl");
-    assert!(again.starts_with(&kept) && again.lines().count() == cut + 1, "{} lines, then {}", cut, again.lines().count());
+    assert!(
+        again.starts_with(&kept) && again.lines().count() == cut + 1,
+        "{} lines, then {}",
+        cut,
+        again.lines().count()
+    );
     assert!(read("held-out.jsonl") == held);
 }
 
@@ -90,24 +110,48 @@ fn the_method_auto_takes_the_best_of_those_that_reach_the_goal() {
     let by_size = encode(&["--size", "90k"]);
     let tried = by_size["tried"].as_array().expect("others");
     assert!(tried.len() >= 5, "{by_size}");
-    assert!(tried.iter().all(|other| number(other, "/metrics/log_rms") >= number(&by_size, "/metrics/log_rms") && number(other, "/bytes") <= 90_000.0));
+    assert!(
+        tried.iter().all(|other| number(other, "/metrics/log_rms") >= number(&by_size, "/metrics/log_rms")
+            && number(other, "/bytes") <= 90_000.0)
+    );
     assert_eq!(std::fs::metadata(&file).expect("written").len() as f64, number(&by_size, "/bytes"));
     assert!(run(&["validate", text(&file)]).stdout.is_empty());
     let cheap = encode(&["--size", "90k", "--prefer", "operations"]);
-    assert!(cheap["tried"].as_array().expect("others").iter().all(|other| number(other, "/operations") >= number(&cheap, "/operations")));
+    assert!(
+        cheap["tried"]
+            .as_array()
+            .expect("others")
+            .iter()
+            .all(|other| number(other, "/operations") >= number(&cheap, "/operations"))
+    );
     assert!(number(&cheap, "/operations") <= number(&by_size, "/operations"));
     let goal = number(&by_size, "/metrics/linear_rms") * 1.2;
     let by_error = encode(&["--rmse", &goal.to_string(), "--domain", "linear"]);
     assert!(number(&by_error, "/metrics/linear_rms") <= goal, "{by_error}");
-    assert!(by_error["tried"].as_array().expect("others").iter().all(|other| number(other, "/bytes") >= number(&by_error, "/bytes")));
-    assert_eq!(run(&["encode", text(&data), "-o", text(&file), "--method", "auto", "--size", "90k", "--edge", "4"]).status.code(), Some(1));
-    assert_eq!(run(&["encode", text(&data), "-o", text(&file), "--size", "90k", "--prefer", "bytes"]).status.code(), Some(1));
+    assert!(
+        by_error["tried"]
+            .as_array()
+            .expect("others")
+            .iter()
+            .all(|other| number(other, "/bytes") >= number(&by_error, "/bytes"))
+    );
+    assert_eq!(
+        run(&["encode", text(&data), "-o", text(&file), "--method", "auto", "--size", "90k", "--edge", "4"])
+            .status
+            .code(),
+        Some(1)
+    );
+    assert_eq!(
+        run(&["encode", text(&data), "-o", text(&file), "--size", "90k", "--prefer", "bytes"]).status.code(),
+        Some(1)
+    );
 }
 
 #[test]
 fn bench_tells_rates_of_a_file() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/carpet07-excerpt.selv");
-    let told: Value = serde_json::from_slice(&succeed(&["bench", "--json", text(&file)]).stdout).expect("JSON");
+    let told: Value =
+        serde_json::from_slice(&succeed(&["bench", "--json", text(&file)]).stdout).expect("JSON");
     let first = &told[0];
     assert!(first["speed"]["random_all"]["median"].as_f64().is_some_and(|rate| rate > 0.0), "{first}");
     assert!(first["operations"]["largest"].as_f64() <= first["operations"]["stated"].as_f64());

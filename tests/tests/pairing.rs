@@ -6,7 +6,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Modules that have a twin.
-const TWINS: [&str; 9] = ["words", "material", "fixed", "direction", "position", "colour", "interpolation", "ensemble", "tensor"];
+const TWINS: [&str; 9] =
+    ["words", "material", "fixed", "direction", "position", "colour", "interpolation", "ensemble", "tensor"];
 /// Stand-ins for a method that is left out; they have a twin too.
 const STAND_INS: [&str; 2] = ["no_ensemble", "no_tensor"];
 
@@ -44,7 +45,11 @@ fn rules_of(source: &str) -> Vec<String> {
     comments
         .filter_map(|comment| {
             let numbers = comment.split(':').next()?;
-            let is_rule = |n: &str| n.contains('.') && n.contains('-') && n.chars().all(|c| c.is_ascii_digit() || c == '.' || c == '-');
+            let is_rule = |n: &str| {
+                n.contains('.')
+                    && n.contains('-')
+                    && n.chars().all(|c| c.is_ascii_digit() || c == '.' || c == '-')
+            };
             numbers.split(", ").all(is_rule).then(|| numbers.to_owned())
         })
         .collect()
@@ -64,7 +69,9 @@ fn rust_type(ty: &syn::Type) -> String {
 
 fn literal(expression: &syn::Expr) -> i64 {
     match expression {
-        syn::Expr::Lit(syn::ExprLit { lit: syn::Lit::Int(value), .. }) => value.base10_parse().expect("an integer"),
+        syn::Expr::Lit(syn::ExprLit { lit: syn::Lit::Int(value), .. }) => {
+            value.base10_parse().expect("an integer")
+        }
         syn::Expr::Unary(syn::ExprUnary { op: syn::UnOp::Neg(_), expr, .. }) => -literal(expr),
         other => panic!("a constant of a twin is a literal, not {}", quote::quote!(#other)),
     }
@@ -81,14 +88,20 @@ fn rust_side(module: &str) -> Side {
                     let syn::FnArg::Typed(typed) = input else { panic!("a twin is no method") };
                     let pattern = &typed.pat;
                     let name = quote::quote!(#pattern).to_string();
-                    (name.trim_start_matches('_') != "words" || rust_type(&typed.ty) != "Words").then(|| (name, rust_type(&typed.ty)))
+                    (name.trim_start_matches('_') != "words" || rust_type(&typed.ty) != "Words")
+                        .then(|| (name, rust_type(&typed.ty)))
                 });
                 let parameters = parameters.collect();
-                let syn::ReturnType::Type(_, result) = &function.sig.output else { panic!("a twin has a result") };
+                let syn::ReturnType::Type(_, result) = &function.sig.output else {
+                    panic!("a twin has a result")
+                };
                 side.functions.push((function.sig.ident.to_string(), parameters, rust_type(result)));
             }
             syn::Item::Struct(item) if !is_one_sided(module, &item.ident.to_string()) => {
-                let fields = item.fields.iter().map(|field| (field.ident.as_ref().expect("named").to_string(), rust_type(&field.ty)));
+                let fields = item
+                    .fields
+                    .iter()
+                    .map(|field| (field.ident.as_ref().expect("named").to_string(), rust_type(&field.ty)));
                 side.structs.insert(item.ident.to_string(), fields.collect());
             }
             syn::Item::Const(item) if item.ident != "_" && !is_one_sided(module, &item.ident.to_string()) => {
@@ -109,7 +122,9 @@ fn wgsl_type(module: &naga::Module, handle: naga::Handle<naga::Type>) -> String 
             naga::ScalarKind::Bool => "bool".into(),
             other => panic!("{other:?}"),
         },
-        naga::TypeInner::Array { base, size: naga::ArraySize::Constant(n), .. } => format!("array<{},{n}>", wgsl_type(module, *base)),
+        naga::TypeInner::Array { base, size: naga::ArraySize::Constant(n), .. } => {
+            format!("array<{},{n}>", wgsl_type(module, *base))
+        }
         _ => ty.name.clone().expect("named"),
     }
 }
@@ -124,18 +139,27 @@ fn wgsl_side(whole: &naga::Module, module: &str) -> Side {
     let text = std::fs::read_to_string(root().join(format!("shaders/wgsl/{module}.wgsl"))).expect("source");
     let mut side = Side { rules: rules_of(&text), ..Side::default() };
     for name in names(&text, "fn ") {
-        let (_, function) = whole.functions.iter().find(|(_, f)| f.name.as_deref() == Some(&name)).expect("declared");
-        let parameters = function.arguments.iter().map(|a| (a.name.clone().expect("named"), wgsl_type(whole, a.ty))).collect();
+        let (_, function) =
+            whole.functions.iter().find(|(_, f)| f.name.as_deref() == Some(&name)).expect("declared");
+        let parameters = function
+            .arguments
+            .iter()
+            .map(|a| (a.name.clone().expect("named"), wgsl_type(whole, a.ty)))
+            .collect();
         let result = wgsl_type(whole, function.result.as_ref().expect("a result").ty);
         side.functions.push((name, parameters, result));
     }
     for name in names(&text, "struct ") {
         let (_, ty) = whole.types.iter().find(|(_, ty)| ty.name.as_deref() == Some(&name)).expect("declared");
         let naga::TypeInner::Struct { members, .. } = &ty.inner else { panic!("{name} is a struct") };
-        side.structs.insert(name, members.iter().map(|m| (m.name.clone().expect("named"), wgsl_type(whole, m.ty))).collect());
+        side.structs.insert(
+            name,
+            members.iter().map(|m| (m.name.clone().expect("named"), wgsl_type(whole, m.ty))).collect(),
+        );
     }
     for name in names(&text, "const ") {
-        let (_, constant) = whole.constants.iter().find(|(_, c)| c.name.as_deref() == Some(&name)).expect("declared");
+        let (_, constant) =
+            whole.constants.iter().find(|(_, c)| c.name.as_deref() == Some(&name)).expect("declared");
         let value = match whole.global_expressions[constant.init] {
             naga::Expression::Literal(naga::Literal::I32(value)) => value as i64,
             naga::Expression::Literal(naga::Literal::U32(value)) => value as i64,
@@ -155,7 +179,8 @@ fn kernel(methods: &[selvedge_shaders::Method]) -> naga::Module {
 fn twins_say_the_same() {
     let (whole, bare) = (kernel(&selvedge_shaders::METHODS), kernel(&[]));
     let mut functions = 0;
-    let twins = TWINS.iter().map(|module| (&whole, *module)).chain(STAND_INS.iter().map(|module| (&bare, *module)));
+    let twins =
+        TWINS.iter().map(|module| (&whole, *module)).chain(STAND_INS.iter().map(|module| (&bare, *module)));
     for (kernel, module) in twins {
         let (rust, wgsl) = (rust_side(module), wgsl_side(kernel, module));
         assert_eq!(rust.functions, wgsl.functions, "functions of {module}");
@@ -182,8 +207,10 @@ fn every_module_of_the_kernel_has_a_twin_or_is_the_entries() {
 fn what_is_listed_as_one_sided_is() {
     for (path, reason) in ONE_SIDED {
         let (module, name) = path.split_once("::").expect("module::name");
-        let rust = std::fs::read_to_string(root().join(format!("decoder-core/src/{module}.rs"))).expect("source");
-        let wgsl = std::fs::read_to_string(root().join(format!("shaders/wgsl/{module}.wgsl"))).expect("source");
+        let rust =
+            std::fs::read_to_string(root().join(format!("decoder-core/src/{module}.rs"))).expect("source");
+        let wgsl =
+            std::fs::read_to_string(root().join(format!("shaders/wgsl/{module}.wgsl"))).expect("source");
         assert!(rust.contains(&format!(" {name}")) && !wgsl.contains(name) && !reason.is_empty(), "{path}");
     }
 }

@@ -9,12 +9,22 @@ use selvedge_tools::random::Random;
 use selvedge_tools::write::{write_material, write_split};
 
 fn direction(random: &mut Random) -> Direction {
-    Direction { x_q18: random.range(-263_000, 263_000) as i32, y_q18: random.range(-263_000, 263_000) as i32, z_q15: random.range(-3, 32_800) as i32 }
+    Direction {
+        x_q18: random.range(-263_000, 263_000) as i32,
+        y_q18: random.range(-263_000, 263_000) as i32,
+        z_q15: random.range(-3, 32_800) as i32,
+    }
 }
 
 fn batch_equals_plain(material: &Selvedge<'_>, random: &mut Random, count: usize) {
-    let queries: Vec<FilteredQuery> =
-        (0..count).map(|_| FilteredQuery { u_q32: random.word(), v_q32: random.word(), light: direction(random), view: direction(random) }).collect();
+    let queries: Vec<FilteredQuery> = (0..count)
+        .map(|_| FilteredQuery {
+            u_q32: random.word(),
+            v_q32: random.word(),
+            light: direction(random),
+            view: direction(random),
+        })
+        .collect();
     let mut scratch = vec![-1; material.batch_scratch_len(count)];
     let mut out = vec![Rgb::default(); count];
     material.sample_batch(&queries, &mut scratch, &mut out).expect("buffers fit");
@@ -33,7 +43,14 @@ fn image_equals_plain(material: &Selvedge<'_>, random: &mut Random) {
     let mut image = vec![Rgb::default(); (width * height) as usize];
     material.decode_image(0, light, view, &mut scratch, &mut image).expect("buffers fit");
     for (i, rgb) in (0u32..).zip(&image) {
-        let values = selvedge::interpolation::texel_values(material.words(), material.material(), i % width, i / width, light_taps, view_taps);
+        let values = selvedge::interpolation::texel_values(
+            material.words(),
+            material.material(),
+            i % width,
+            i / width,
+            light_taps,
+            view_taps,
+        );
         assert_eq!(selvedge::interpolation::radiance(material.material(), values, light_taps), *rgb);
     }
 }
@@ -154,7 +171,11 @@ fn sample_directions_are_found() {
             assert_eq!([asked.x_q18, asked.y_q18], [x << 4, y << 4]);
             let taps = material.locate_light(asked);
             let weight: i32 =
-                [(taps.a, taps.weight_a_q15), (taps.b, taps.weight_b_q15), (taps.c, taps.weight_c_q15)].iter().filter(|t| t.0 as usize == i).map(|t| t.1).sum();
+                [(taps.a, taps.weight_a_q15), (taps.b, taps.weight_b_q15), (taps.c, taps.weight_c_q15)]
+                    .iter()
+                    .filter(|t| t.0 as usize == i)
+                    .map(|t| t.1)
+                    .sum();
             assert_eq!(weight, 32_768, "seed {seed} direction {i}");
         }
     }
@@ -175,19 +196,27 @@ fn the_place_on_the_hull_is_the_nearest() {
             let taps = material.locate_light(asked);
             let at = |i: u32| model.lights[i as usize].map(|c| c as f64);
             let blend: [f64; 2] = std::array::from_fn(|c| {
-                (at(taps.a)[c] * taps.weight_a_q15 as f64 + at(taps.b)[c] * taps.weight_b_q15 as f64 + at(taps.c)[c] * taps.weight_c_q15 as f64) / 32_768.0
+                (at(taps.a)[c] * taps.weight_a_q15 as f64
+                    + at(taps.b)[c] * taps.weight_b_q15 as f64
+                    + at(taps.c)[c] * taps.weight_c_q15 as f64)
+                    / 32_768.0
             });
             let distance = |q: [f64; 2]| ((q[0] - p[0]).powi(2) + (q[1] - p[1]).powi(2)).sqrt();
             let hull = &triangulation.hull;
             let nearest = (0..hull.len()).map(|i| {
                 let (a, b) = (at(hull[i]), at(hull[(i + 1) % hull.len()]));
                 let d = [b[0] - a[0], b[1] - a[1]];
-                let t = (((p[0] - a[0]) * d[0] + (p[1] - a[1]) * d[1]) / (d[0] * d[0] + d[1] * d[1])).clamp(0.0, 1.0);
+                let t = (((p[0] - a[0]) * d[0] + (p[1] - a[1]) * d[1]) / (d[0] * d[0] + d[1] * d[1]))
+                    .clamp(0.0, 1.0);
                 distance([a[0] + t * d[0], a[1] + t * d[1]])
             });
             let nearest = nearest.fold(if hull.is_empty() { distance(at(0)) } else { f64::MAX }, f64::min);
             let inside = taps.weight_c_q15 > 0 || distance(blend) < 3.0;
-            assert!(inside || (distance(blend) - nearest).abs() < 3.0, "seed {seed} {asked:?}: {} {nearest}", distance(blend));
+            assert!(
+                inside || (distance(blend) - nearest).abs() < 3.0,
+                "seed {seed} {asked:?}: {} {nearest}",
+                distance(blend)
+            );
         }
     }
 }
@@ -205,7 +234,8 @@ fn filtered_samples_meet_point_samples() {
                 Direction { x_q18: x << 4, y_q18: y << 4, z_q15: 32_768 }
             };
             let (l, v) = (material.locate_light(at(light)), material.locate_view(at(view)));
-            // The centre of texel (0, 1) of 3 x 2, where the fractions of u and v are exactly representable: v.
+            // The centre of texel (0, 1) of 3 x 2, where the fractions of u and v are exactly representable:
+            // v.
             let values = material.filtered_values(((1u64 << 32) / 6 + 1) as u32, 0xc000_0000, l, v);
             let point = material.point_values(0, 1, light, view);
             assert!((values.c0 - point.c0).abs() <= 200 && values.c1 == point.c1, "{values:?} {point:?}");

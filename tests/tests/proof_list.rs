@@ -1,4 +1,5 @@
-//! The proof that nothing panics (`firmware/src/proof.rs`) calls every public function of the decoder, and every method of a public type.
+//! The proof that nothing panics (`firmware/src/proof.rs`) calls every public function of the decoder, and
+//! every method of a public type.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -49,7 +50,10 @@ fn calls() -> Vec<Vec<String>> {
                     let name = function.sig.ident.to_string();
                     let at_root = root.contains(&name).then(|| format!("selvedge::{name}("));
                     let in_module = is_public.then(|| format!("{module}::{name}("));
-                    calls.extend(Some(at_root.into_iter().chain(in_module).collect::<Vec<_>>()).filter(|ways| !ways.is_empty()));
+                    calls.extend(
+                        Some(at_root.into_iter().chain(in_module).collect::<Vec<_>>())
+                            .filter(|ways| !ways.is_empty()),
+                    );
                 }
                 Item::Impl(block) if block.trait_.is_none() => {
                     let syn::Type::Path(path) = &*block.self_ty else { continue };
@@ -79,7 +83,8 @@ fn calls() -> Vec<Vec<String>> {
 fn the_proof_calls_every_public_function() {
     let proof = source("firmware/src/proof.rs");
     let calls = calls();
-    let missing: Vec<_> = calls.iter().filter(|ways| !ways.iter().any(|way| proof.contains(way.as_str()))).collect();
+    let missing: Vec<_> =
+        calls.iter().filter(|ways| !ways.iter().any(|way| proof.contains(way.as_str()))).collect();
     assert!(missing.is_empty(), "not in firmware/src/proof.rs: {missing:?}");
     assert!(calls.len() > 110, "{}", calls.len());
     println!("{} public functions and methods", calls.len());

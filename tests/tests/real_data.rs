@@ -46,15 +46,20 @@ fn check_values_hold_on_cpu_and_kernel() {
         let bytes = write::write_material(&authors.to_model(VALUE_BITS).expect("model"));
         let material = selvedge::open(&bytes, &Limits::default()).expect("legal");
         for &(_, x, y, light, view, u, v) in CHECK_VALUES.iter().filter(|check| check.0 == name) {
-            assert!((authors.value(1, x as usize, y as usize, light as usize, view as usize) - u).abs() < 1e-6);
-            assert!((authors.value(2, x as usize, y as usize, light as usize, view as usize) - v).abs() < 1e-6);
+            assert!(
+                (authors.value(1, x as usize, y as usize, light as usize, view as usize) - u).abs() < 1e-6
+            );
+            assert!(
+                (authors.value(2, x as usize, y as usize, light as usize, view as usize) - v).abs() < 1e-6
+            );
             let values = material.point_values(x, y, light, view);
             for (decoded, wanted) in [(natural(values.c1), u), (natural(values.c2), v)] {
                 worst = worst.max((decoded - wanted).abs());
                 assert!((decoded - wanted).abs() < STATED_ERROR, "{name} {x} {y}: {decoded} {wanted}");
             }
             if let Some(gpu) = &gpu {
-                let query = Query { u: x, v: y, light: [light, 0, 0], view: [view, 0, 0], ..Query::default() };
+                let query =
+                    Query { u: x, v: y, light: [light, 0, 0], view: [view, 0, 0], ..Query::default() };
                 let answer = gpu.answer(&gpu.load(&[material]), "texel", &[query]).expect("answer")[0];
                 assert_eq!(answer.values, [values.c0, values.c1, values.c2]);
             }
@@ -98,7 +103,9 @@ fn texture_is_kept_in_the_full_materials() {
 /// The file in the repository is what the importer makes of the excerpt.
 #[test]
 fn the_excerpt_imports_to_the_same_bytes() {
-    let model = sparsebtf::read_material(&excerpt_folder(), "carpet07", None).and_then(|m| m.to_model(VALUE_BITS)).expect("data");
+    let model = sparsebtf::read_material(&excerpt_folder(), "carpet07", None)
+        .and_then(|m| m.to_model(VALUE_BITS))
+        .expect("data");
     let stored = std::fs::read(excerpt_folder().join("../carpet07-excerpt.selv")).expect("file");
     assert!(write::write_material(&model) == stored);
 }
@@ -107,10 +114,12 @@ fn the_excerpt_imports_to_the_same_bytes() {
 /// never moves by more than 0.001. (Blending the two nearest directions jumps by 0.22 to 0.25.)
 #[test]
 fn values_are_continuous_in_the_directions() {
-    let folder = full_data_folder("continuity on the full materials; the excerpt is used").unwrap_or_else(excerpt_folder);
+    let folder = full_data_folder("continuity on the full materials; the excerpt is used")
+        .unwrap_or_else(excerpt_folder);
     let step = 0.01f64.to_radians();
     for name in ["carpet07", "felt05"] {
-        let model = sparsebtf::read_material(&folder, name, None).and_then(|m| m.to_model(VALUE_BITS)).expect("data");
+        let model =
+            sparsebtf::read_material(&folder, name, None).and_then(|m| m.to_model(VALUE_BITS)).expect("data");
         let bytes = write::write_material(&model);
         let material = selvedge::open(&bytes, &Limits::default()).expect("legal");
         let mut random = Random::new(5);
@@ -135,14 +144,20 @@ fn values_are_continuous_in_the_directions() {
                 }
                 let moving = Direction::from_unit_vector(moving.map(|c| c as f32));
                 let (light, view) = if arc % 2 == 0 { (moving, still) } else { (still, moving) };
-                let now = material.filtered_values(u, v, material.locate_light(light), material.locate_view(view));
+                let now =
+                    material.filtered_values(u, v, material.locate_light(light), material.locate_view(view));
                 if let Some(before) = before {
-                    for (largest, (a, b)) in largest.iter_mut().zip([(now.c0, before.c0), (now.c1, before.c1), (now.c2, before.c2)]) {
+                    for (largest, (a, b)) in largest.iter_mut().zip([
+                        (now.c0, before.c0),
+                        (now.c1, before.c1),
+                        (now.c2, before.c2),
+                    ]) {
                         *largest = (*largest).max((a - b).abs());
                     }
                 }
                 if let Some(before) = before {
-                    let difference = [now.c0 - before.c0, now.c1 - before.c1, now.c2 - before.c2].map(natural);
+                    let difference =
+                        [now.c0 - before.c0, now.c1 - before.c1, now.c2 - before.c2].map(natural);
                     for (largest, row) in largest_rgb.iter_mut().zip(sparsebtf::YUV_TO_RGB) {
                         *largest = largest.max((0..3).map(|i| row[i] * difference[i]).sum::<f64>().abs());
                     }
@@ -151,8 +166,14 @@ fn values_are_continuous_in_the_directions() {
             }
         }
         let largest = largest.map(natural);
-        println!("{name}: largest steps of the log value for 0.01 degrees: Y {:.5}, U {:.5}, V {:.5}", largest[0], largest[1], largest[2]);
-        println!("{name}: of the logs of R, G, B: {:.5}, {:.5}, {:.5}", largest_rgb[0], largest_rgb[1], largest_rgb[2]);
+        println!(
+            "{name}: largest steps of the log value for 0.01 degrees: Y {:.5}, U {:.5}, V {:.5}",
+            largest[0], largest[1], largest[2]
+        );
+        println!(
+            "{name}: of the logs of R, G, B: {:.5}, {:.5}, {:.5}",
+            largest_rgb[0], largest_rgb[1], largest_rgb[2]
+        );
         assert!(largest.iter().all(|&step| step <= 0.001), "{largest:?}");
         assert!(largest[0] > 0.0);
     }
@@ -185,6 +206,9 @@ fn directions_are_stored_where_they_are() {
         let stored = triangulate::unproject(triangulate::project(direction));
         assert!(stored.distance(direction) < 1e-4);
     }
-    let triangulation = triangulate::triangulate(&authors.directions.iter().map(|&d| triangulate::project(d)).collect::<Vec<_>>(), None);
+    let triangulation = triangulate::triangulate(
+        &authors.directions.iter().map(|&d| triangulate::project(d)).collect::<Vec<_>>(),
+        None,
+    );
     assert_eq!(triangulation.triangles.len(), 2 * 151 - 2 - 24);
 }

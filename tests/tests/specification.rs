@@ -12,8 +12,16 @@ fn read(name: &str) -> String {
 /// Rule numbers such as 5.4-2 at the begin of a line in bold.
 fn stated_rules() -> Vec<String> {
     let spec = read("spec/selvedge-1.md");
-    let numbers = spec.lines().filter_map(|line| line.strip_prefix("**")?.split_once("**").map(|(number, _)| number.to_owned()));
-    numbers.filter(|n| n.contains('.') && n.contains('-') && n.chars().all(|c| c.is_ascii_digit() || c == '.' || c == '-')).collect()
+    let numbers = spec
+        .lines()
+        .filter_map(|line| line.strip_prefix("**")?.split_once("**").map(|(number, _)| number.to_owned()));
+    numbers
+        .filter(|n| {
+            n.contains('.')
+                && n.contains('-')
+                && n.chars().all(|c| c.is_ascii_digit() || c == '.' || c == '-')
+        })
+        .collect()
 }
 
 #[test]
@@ -21,7 +29,8 @@ fn every_rule_of_the_code_is_in_the_specification_once() {
     let stated = stated_rules();
     let unique: BTreeSet<_> = stated.iter().collect();
     assert_eq!(unique.len(), stated.len(), "a number is used twice");
-    let missing: Vec<_> = Rule::ALL.iter().map(|rule| rule.id()).filter(|id| !unique.contains(&(*id).to_owned())).collect();
+    let missing: Vec<_> =
+        Rule::ALL.iter().map(|rule| rule.id()).filter(|id| !unique.contains(&(*id).to_owned())).collect();
     assert!(missing.is_empty(), "{missing:?}");
     println!("{} rules, {} of them checked by open", stated.len(), Rule::ALL.len());
 }
@@ -45,10 +54,16 @@ fn every_rule_that_a_comment_cites_is_in_the_specification() {
     ];
     let mut cited = 0;
     for folder in sources {
-        for entry in std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(folder)).expect(folder) {
+        for entry in
+            std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(folder)).expect(folder)
+        {
             let path = entry.expect("entry").path();
             if path.is_dir() {
-                assert!(sources.iter().any(|source| path.ends_with(source)), "{}: a folder that is not looked at", path.display());
+                assert!(
+                    sources.iter().any(|source| path.ends_with(source)),
+                    "{}: a folder that is not looked at",
+                    path.display()
+                );
                 continue;
             }
             let text = std::fs::read_to_string(&path).expect("source");
@@ -56,8 +71,11 @@ fn every_rule_that_a_comment_cites_is_in_the_specification() {
                 for word in comment.split(|c: char| !(c.is_ascii_digit() || c == '.' || c == '-')) {
                     let word = word.trim_end_matches(['.', '-']);
                     let parts: Vec<&str> = word.split(['.', '-']).collect();
-                    let is_rule =
-                        word.contains('.') && word.contains('-') && parts.len() == 3 && word.find('.') < word.find('-') && parts.iter().all(|p| !p.is_empty());
+                    let is_rule = word.contains('.')
+                        && word.contains('-')
+                        && parts.len() == 3
+                        && word.find('.') < word.find('-')
+                        && parts.iter().all(|p| !p.is_empty());
                     if is_rule {
                         cited += 1;
                         assert!(stated.contains(word), "{}: {word} is cited and not stated", path.display());
@@ -100,18 +118,37 @@ fn the_worked_example_is_what_the_writer_makes() {
                 continue;
             }
             if inside && !line.trim().is_empty() {
-                let offset = usize::from_str_radix(line.split_whitespace().next().expect("an offset"), 16).expect("hex");
-                let bytes: Vec<u8> = line.split_whitespace().skip(1).map(|byte| u8::from_str_radix(byte, 16).expect("hex")).collect();
-                assert_eq!(&file[offset..offset + bytes.len()], bytes, "{line}\nis\n{}", hex_dump(&file[offset..offset + bytes.len()], offset));
+                let offset = usize::from_str_radix(line.split_whitespace().next().expect("an offset"), 16)
+                    .expect("hex");
+                let bytes: Vec<u8> = line
+                    .split_whitespace()
+                    .skip(1)
+                    .map(|byte| u8::from_str_radix(byte, 16).expect("hex"))
+                    .collect();
+                assert_eq!(
+                    &file[offset..offset + bytes.len()],
+                    bytes,
+                    "{line}\nis\n{}",
+                    hex_dump(&file[offset..offset + bytes.len()], offset)
+                );
                 shown.extend(offset..offset + bytes.len());
             }
         }
         let opened = selvedge::open(&file, &selvedge::Limits::NONE).expect("legal");
-        assert!(spec.contains(&selvedge_tools::inspect::hex(&opened.decode_digest())), "the decode digest of the example is another");
-        // Every byte but padding: a stranger can put the example together from the text. The second file shows what the first has not.
+        assert!(
+            spec.contains(&selvedge_tools::inspect::hex(&opened.decode_digest())),
+            "the decode digest of the example is another"
+        );
+        // Every byte but padding: a stranger can put the example together from the text. The second file
+        // shows what the first has not.
         let parts = selvedge_tools::example::parts(&file);
-        for (name, bytes, offset) in parts.iter().filter(|(name, ..)| fence == "```hex" || name.starts_with("section 02")) {
-            assert!((*offset..offset + bytes.len()).all(|at| shown.contains(&at)), "{name} is not shown whole");
+        for (name, bytes, offset) in
+            parts.iter().filter(|(name, ..)| fence == "```hex" || name.starts_with("section 02"))
+        {
+            assert!(
+                (*offset..offset + bytes.len()).all(|at| shown.contains(&at)),
+                "{name} is not shown whole"
+            );
         }
     }
 }

@@ -23,7 +23,11 @@ fn open(file: &[u8]) -> Selvedge<'_> {
 }
 
 fn cases(count: u32) -> ProptestConfig {
-    ProptestConfig { cases: setting("SELVEDGE_CASES", count as usize) as u32, failure_persistence: None, ..ProptestConfig::default() }
+    ProptestConfig {
+        cases: setting("SELVEDGE_CASES", count as usize) as u32,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    }
 }
 
 /// A direction anywhere, or at and near a sample direction, a middle of two, or the prolongation of two.
@@ -40,20 +44,34 @@ fn direction(random: &mut Random, points: &[[i32; 2]]) -> Direction {
         // Square to the line of two: where edges of the hull in one line meet.
         _ => [a[0] + b[1] - a[1], a[1] - b[0] + a[0]],
     };
-    Direction { x_q18: x.clamp(-262_144, 262_144), y_q18: y.clamp(-262_144, 262_144), z_q15: random.range(0, 32_768) as i32 }
+    Direction {
+        x_q18: x.clamp(-262_144, 262_144),
+        y_q18: y.clamp(-262_144, 262_144),
+        z_q15: random.range(0, 32_768) as i32,
+    }
 }
 
 fn sector(random: &mut Random) -> Sector {
     let polar_max = random.pick(&[0.0, 1.0, 20.0, 45.0, 75.0, 90.0]);
     let width = random.pick(&[0.0, 3.0, 40.0, 90.0, 200.0, 359.0]);
     let from = random.range(-400, 400) as f64;
-    Sector::new(polar_max, random.once_in(4).then_some([from, from + width]).or_else(|| random.once_in(2).then_some([0.0, 90.0]))).expect("angles")
+    Sector::new(
+        polar_max,
+        random
+            .once_in(4)
+            .then_some([from, from + width])
+            .or_else(|| random.once_in(2).then_some([0.0, 90.0])),
+    )
+    .expect("angles")
 }
 
 /// A direction in the sector, after a few tries.
 fn inside(random: &mut Random, points: &[[i32; 2]], sector: &Option<Sector>) -> Direction {
     let is_inside = |direction: &Direction| sector.is_none_or(|sector| sector.contains(*direction));
-    (0..60).map(|_| direction(random, points)).find(is_inside).unwrap_or(Direction { z_q15: 30_000, ..Direction::default() })
+    (0..60)
+        .map(|_| direction(random, points))
+        .find(is_inside)
+        .unwrap_or(Direction { z_q15: 30_000, ..Direction::default() })
 }
 
 fn as_array(values: Values) -> [i32; 3] {
@@ -84,26 +102,51 @@ fn hold_trim(model: &MaterialModel, options: &Trim, random: &mut Random, count: 
     };
     for _ in 0..count {
         let (x, y) = (random.range(0, 40) as u32, random.range(0, 40) as u32);
-        let (l, v) = (random.range(0, lights.len() as i64 - 1) as usize, random.range(0, views.len() as i64 - 1) as usize);
+        let (l, v) = (
+            random.range(0, lights.len() as i64 - 1) as usize,
+            random.range(0, views.len() as i64 - 1) as usize,
+        );
         let point = trimmed.point_values(x, y, l as u32, v as u32);
         same(point, whole.point_values(x, y, lights[l], views[v]), "point");
 
         let (u_q32, v_q32) = (random.word(), random.word());
-        let (light, view) = (inside(random, &model.lights, &options.lights), inside(random, model.views(), &options.views));
+        let (light, view) =
+            (inside(random, &model.lights, &options.lights), inside(random, model.views(), &options.views));
         let located = |material: &Selvedge<'_>| (material.locate_light(light), material.locate_view(view));
         let ((l, v), (whole_l, whole_v)) = (located(&trimmed), located(&whole));
-        let renumbered = [lights[l.a as usize], lights[l.b as usize], lights[l.c as usize], l.weight_a_q15 as u32, l.weight_b_q15 as u32, l.cosine_q15 as u32];
-        let wanted = [whole_l.a, whole_l.b, whole_l.c, whole_l.weight_a_q15 as u32, whole_l.weight_b_q15 as u32, whole_l.cosine_q15 as u32];
+        let renumbered = [
+            lights[l.a as usize],
+            lights[l.b as usize],
+            lights[l.c as usize],
+            l.weight_a_q15 as u32,
+            l.weight_b_q15 as u32,
+            l.cosine_q15 as u32,
+        ];
+        let wanted = [
+            whole_l.a,
+            whole_l.b,
+            whole_l.c,
+            whole_l.weight_a_q15 as u32,
+            whole_l.weight_b_q15 as u32,
+            whole_l.cosine_q15 as u32,
+        ];
         assert_eq!(renumbered, wanted, "{light:?}");
         let level = random.range(0, left.level_count as i64 - 1) as u32;
         let at = |m: &Selvedge<'_>, l, v| filtered_values(m.words(), m.material(), level, u_q32, v_q32, l, v);
         same(at(&trimmed, l, v), at(&whole, whole_l, whole_v), "filtered");
         let level_q16 = random.range(0, ((left.level_count as i64 - 1) << 16).max(0)) as u32;
-        let between = |m: &Selvedge<'_>, l, v| trilinear_values(m.words(), m.material(), level_q16, u_q32, v_q32, l, v);
+        let between =
+            |m: &Selvedge<'_>, l, v| trilinear_values(m.words(), m.material(), level_q16, u_q32, v_q32, l, v);
         same(between(&trimmed, l, v), between(&whole, whole_l, whole_v), "between levels");
         if keeps_all {
-            assert_eq!(trimmed.filtered(u_q32, v_q32, light, view), whole.filtered(u_q32, v_q32, light, view));
-            assert_eq!(trimmed.trilinear(level_q16, u_q32, v_q32, light, view), whole.trilinear(level_q16, u_q32, v_q32, light, view));
+            assert_eq!(
+                trimmed.filtered(u_q32, v_q32, light, view),
+                whole.filtered(u_q32, v_q32, light, view)
+            );
+            assert_eq!(
+                trimmed.trilinear(level_q16, u_q32, v_q32, light, view),
+                whole.trilinear(level_q16, u_q32, v_q32, light, view)
+            );
         }
     }
 }
@@ -166,10 +209,13 @@ fn the_excerpt_and_the_example_are_read_back() {
     assert_eq!(model_of(&open(&write_material(&model))), model);
 }
 
-/// Hulls that would begin elsewhere if directions left, with queries above a point between two edges in one line.
+/// Hulls that would begin elsewhere if directions left, with queries above a point between two edges in one
+/// line.
 #[test]
 fn the_hull_begins_where_it_did() {
-    for (seed, polar_max, [x_q18, y_q18]) in [(501_238, 75.0, [170_252, 76_001]), (505_026, 1.0, [816, 32]), (506_440, 90.0, [240, 992])] {
+    for (seed, polar_max, [x_q18, y_q18]) in
+        [(501_238, 75.0, [170_252, 76_001]), (505_026, 1.0, [816, 32]), (506_440, 90.0, [240, 992])]
+    {
         let model = extreme_of_any_method(seed);
         let sector = Sector::new(polar_max, Some([0.0, 90.0])).expect("angles");
         let kept = kept_directions(&model.lights, &sector);
@@ -196,14 +242,20 @@ fn the_excerpt_is_trimmed() {
     let model = model_of(&open(&excerpt()));
     let mut random = Random::new(11);
     let whole = write_material(&model).len();
-    for (polar_max, azimuth) in [(0.0, None), (30.0, None), (60.0, Some([0.0, 90.0])), (90.0, Some([300.0, 20.0])), (90.0, None)] {
+    for (polar_max, azimuth) in
+        [(0.0, None), (30.0, None), (60.0, Some([0.0, 90.0])), (90.0, Some([300.0, 20.0])), (90.0, None)]
+    {
         let sector = Sector::new(polar_max, azimuth).expect("angles");
         for (lights, views) in [(Some(sector), None), (None, Some(sector)), (Some(sector), Some(sector))] {
             let options = Trim { lights, views, unused: true, ..Trim::default() };
             hold_trim(&model, &options, &mut random, 60);
             let left = trim(&model, &options).expect("options that fit");
             let length = write_material(&left).len();
-            println!("{polar_max} {azimuth:?}: {} lights, {} views, {length} of {whole} bytes", left.lights.len(), left.views().len());
+            println!(
+                "{polar_max} {azimuth:?}: {} lights, {} views, {length} of {whole} bytes",
+                left.lights.len(),
+                left.views().len()
+            );
         }
     }
     let few = kept_directions(&model.lights, &Sector::new(30.0, None).expect("angles"));
@@ -221,7 +273,10 @@ fn options_that_do_not_fit_are_refused() {
         Trim { levels: Some(3), ..Trim::default() },
         Trim { lights: Some(Sector { polar_max: 91.0, azimuth: None }), ..Trim::default() },
         Trim { views: Some(Sector { polar_max: f64::NAN, azimuth: None }), ..Trim::default() },
-        Trim { views: Some(Sector { polar_max: 9.0, azimuth: Some([0.0, f64::INFINITY]) }), ..Trim::default() },
+        Trim {
+            views: Some(Sector { polar_max: 9.0, azimuth: Some([0.0, f64::INFINITY]) }),
+            ..Trim::default()
+        },
     ] {
         assert_eq!(trim(&model, &options).expect_err("refused").exit_code(), 1, "{options:?}");
     }

@@ -4,7 +4,9 @@ use selvedge::{Limits, Rule};
 use selvedge_tools::example::example_model;
 use selvedge_tools::extreme::extreme_model;
 use selvedge_tools::model::{AtomModel, MaterialModel};
-use selvedge_tools::validate::{ADVICE, Options, Reports, Severity, files_of, sarif, schema, text, validate, validate_files};
+use selvedge_tools::validate::{
+    ADVICE, Options, Reports, Severity, files_of, sarif, schema, text, validate, validate_files,
+};
 use selvedge_tools::vectors::{Answer, read};
 use selvedge_tools::write::{repair_checksums, write_material};
 use std::path::{Path, PathBuf};
@@ -22,16 +24,26 @@ fn check(bytes: &[u8]) -> selvedge_tools::validate::FileReport {
 fn findings_of_the_suite_are_those_of_open() {
     let suite = read(&root().join("spec/vectors")).expect("suite");
     for vector in &suite {
-        let dictionary = vector.dictionary.as_ref().map(|path| &suite.iter().find(|v| v.path == *path).expect("there").bytes[..]);
+        let dictionary = vector
+            .dictionary
+            .as_ref()
+            .map(|path| &suite.iter().find(|v| v.path == *path).expect("there").bytes[..]);
         let options = Options { limits: vector.limits(), ..Options::default() };
         let report = validate(&vector.path, &vector.bytes, dictionary, &options);
         match &vector.answer {
             Answer::Broken(rule, part, offset, found) => {
                 let first = &report.findings[0];
-                assert_eq!((first.rule, first.part, first.offset, first.found), (rule.as_str(), part.as_str(), *offset, *found), "{}", vector.path);
+                assert_eq!(
+                    (first.rule, first.part, first.offset, first.found),
+                    (rule.as_str(), part.as_str(), *offset, *found),
+                    "{}",
+                    vector.path
+                );
                 assert!(!report.valid && report.exit_code != 0);
             }
-            Answer::Digest(_) | Answer::Legal => assert!(report.valid && report.exit_code == 0, "{}: {:?}", vector.path, report.findings),
+            Answer::Digest(_) | Answer::Legal => {
+                assert!(report.valid && report.exit_code == 0, "{}: {:?}", vector.path, report.findings)
+            }
         }
     }
 }
@@ -89,7 +101,10 @@ fn unwise_files_are_told_what_is_unwise() {
         model.size = [128, 2];
         model.level_count = 1;
         let e = ensemble(&mut model);
-        e.dictionaries[0].view = selvedge_tools::model::FactorModel { columns: 200, entries: (0..1000).map(|i| i as i16).collect() };
+        e.dictionaries[0].view = selvedge_tools::model::FactorModel {
+            columns: 200,
+            entries: (0..1000).map(|i| i as i16).collect(),
+        };
         e.atoms[0] = (0..largest).map(|view| AtomModel { view, step: 9, ..AtomModel::default() }).collect();
         let mut one = e.coefficients[0][0].records[0].clone();
         one.coefficients = vec![(0, 3)];
@@ -109,7 +124,8 @@ fn severities_can_be_changed() {
     let file = write_material(&model);
     let with = |warnings_as_errors: bool, severities: &[(&str, Severity)]| {
         let severities = severities.iter().map(|(rule, severity)| ((*rule).to_owned(), *severity)).collect();
-        let report = validate("file", &file, None, &Options { limits: Limits::NONE, warnings_as_errors, severities });
+        let report =
+            validate("file", &file, None, &Options { limits: Limits::NONE, warnings_as_errors, severities });
         (report.count(), report.exit_code)
     };
     assert_eq!(with(false, &[]), (1, 0));
@@ -126,11 +142,14 @@ fn the_published_schema_is_that_of_the_reports() {
     let published = std::fs::read_to_string(root().join("spec/validation.schema.json")).expect("published");
     assert!(published == schema(), "selvedge validate --schema > spec/validation.schema.json");
     let report = check(&write_material(&extreme_model(3))[..500]);
-    let reports = serde_json::to_value(Reports { format: "selvedge-validation-1", version: "0", files: vec![report] }).expect("plain");
+    let reports =
+        serde_json::to_value(Reports { format: "selvedge-validation-1", version: "0", files: vec![report] })
+            .expect("plain");
     let schema: serde_json::Value = serde_json::from_str(&published).expect("JSON");
     // Every field that is written is described, and every required one is written.
     let describes = |value: &serde_json::Value, schema: &serde_json::Value| {
-        let (value, properties) = (value.as_object().expect("object"), schema["properties"].as_object().expect("properties"));
+        let (value, properties) =
+            (value.as_object().expect("object"), schema["properties"].as_object().expect("properties"));
         assert!(value.keys().all(|key| properties.contains_key(key)), "{value:?}");
         let required = schema["required"].as_array().expect("required");
         assert!(required.iter().all(|key| value.contains_key(key.as_str().expect("name"))), "{value:?}");
@@ -144,7 +163,8 @@ fn the_published_schema_is_that_of_the_reports() {
 fn sarif_names_rules_that_it_lists() {
     let file = write_material(&example_model());
     let log = sarif(&[check(&file[..1000]), check(b"no material")]);
-    let (rules, results) = (&log["runs"][0]["tool"]["driver"]["rules"], log["runs"][0]["results"].as_array().expect("results"));
+    let (rules, results) =
+        (&log["runs"][0]["tool"]["driver"]["rules"], log["runs"][0]["results"].as_array().expect("results"));
     assert_eq!(rules.as_array().expect("rules").len(), Rule::ALL.len() + ADVICE.len());
     assert!(results.len() >= 2);
     for result in results {
@@ -174,7 +194,13 @@ fn folders_and_standard_input() {
     };
     validate_files(&paths, None, &Options::default(), &mut each).expect("read");
     assert!(seen.iter().map(|(file, _)| file).eq(paths.iter().map(|p| p.to_str().expect("UTF-8"))));
-    assert_eq!(seen.iter().filter(|(_, code)| *code != 0).map(|(file, _)| file.ends_with("deep/077.selv")).collect::<Vec<_>>(), [true]);
+    assert_eq!(
+        seen.iter()
+            .filter(|(_, code)| *code != 0)
+            .map(|(file, _)| file.ends_with("deep/077.selv"))
+            .collect::<Vec<_>>(),
+        [true]
+    );
     let run = |input: &[u8], arguments: &[&str]| {
         use std::io::Write;
         let mut child = Command::new(selvedge_tests::program())

@@ -1,4 +1,5 @@
-//! The conformance suite: recipes make the files that are in the repository, and all of them are answered as stated.
+//! The conformance suite: recipes make the files that are in the repository, and all of them are answered as
+//! stated.
 
 use selvedge::{First, Limits, Rule};
 use selvedge_tools::conform::{run_own, run_program};
@@ -16,17 +17,29 @@ fn suite() -> Vec<Vector> {
 
 /// Name of a vector without folder and ending.
 fn name(vector: &Vector) -> &str {
-    vector.path.split('/').next_back().and_then(|file| file.strip_suffix(".selv")).expect("a path of the suite")
+    vector
+        .path
+        .split('/')
+        .next_back()
+        .and_then(|file| file.strip_suffix(".selv"))
+        .expect("a path of the suite")
 }
 
 #[test]
 fn recipes_make_the_files_of_the_suite() {
     let made = make(&folder()).expect("recipes");
     let text = std::fs::read_to_string(folder().join("manifest.tsv")).expect("manifest");
-    assert!(manifest(&made) == text, "the manifest is not that of the recipes: selvedge conform --make spec/vectors");
+    assert!(
+        manifest(&made) == text,
+        "the manifest is not that of the recipes: selvedge conform --make spec/vectors"
+    );
     let mut listed = BTreeSet::new();
     for vector in &made {
-        assert!(std::fs::read(folder().join(&vector.path)).expect("a file of the suite") == vector.bytes, "{} is not what its recipe makes", vector.path);
+        assert!(
+            std::fs::read(folder().join(&vector.path)).expect("a file of the suite") == vector.bytes,
+            "{} is not what its recipe makes",
+            vector.path
+        );
         assert!(!vector.note.is_empty());
         listed.insert(vector.path.clone());
     }
@@ -57,7 +70,12 @@ fn every_vector_is_answered_as_stated() {
         selvedge::validate(&vector.bytes, dictionary, &vector.limits(), &mut sink);
         assert_eq!((clean, first.0), (all.is_empty(), all.first().copied()), "{}", vector.path);
         if let (Answer::Broken(rule, _, offset, found), Some(finding)) = (&vector.answer, first.0) {
-            assert_eq!((rule.as_str(), *offset, *found), (finding.rule.id(), finding.offset, finding.found), "{}", vector.path);
+            assert_eq!(
+                (rule.as_str(), *offset, *found),
+                (finding.rule.id(), finding.offset, finding.found),
+                "{}",
+                vector.path
+            );
         } else {
             assert_eq!(first.0, None, "{}", vector.path);
         }
@@ -110,19 +128,32 @@ fn table_code_and_vectors_name_the_same_rules() {
     let table = std::fs::read_to_string(folder().join("../conformance.md")).expect("table");
     let names = |cell: &str| cell.split('`').skip(1).step_by(2).map(str::to_owned).collect::<Vec<_>>();
     let mut rows = 0;
-    for line in table.lines().filter(|line| line.starts_with("| ") && line.as_bytes().get(2).is_some_and(u8::is_ascii_digit)) {
+    for line in table
+        .lines()
+        .filter(|line| line.starts_with("| ") && line.as_bytes().get(2).is_some_and(u8::is_ascii_digit))
+    {
         let cells: Vec<&str> = line.trim_matches('|').split('|').map(str::trim).collect();
         let wanted = rejects.get(cells[0]).cloned().unwrap_or_default();
         assert_eq!(names(cells[3]), wanted, "{}: vectors that break it", cells[0]);
         for accepts in names(cells[2]) {
-            let there = accepted.contains(accepts.as_str()) || accepts == "extreme" && accepted.iter().any(|name| name.starts_with("extreme-"));
+            let there = accepted.contains(accepts.as_str())
+                || accepts == "extreme" && accepted.iter().any(|name| name.starts_with("extreme-"));
             assert!(there, "{}: {accepts} is no valid vector", cells[0]);
         }
         let says_why = cells[4].starts_with("not tested");
-        assert!(!names(cells[2]).is_empty() || says_why || !names(cells[4]).is_empty(), "{}: neither a vector nor a reason", cells[0]);
+        assert!(
+            !names(cells[2]).is_empty() || says_why || !names(cells[4]).is_empty(),
+            "{}: neither a vector nor a reason",
+            cells[0]
+        );
         rows += 1;
     }
-    println!("{rows} rules, {} of them broken by {} vectors, {} valid vectors", Rule::ALL.len(), suite.len() - accepted.len(), accepted.len());
+    println!(
+        "{rows} rules, {} of them broken by {} vectors, {} valid vectors",
+        Rule::ALL.len(),
+        suite.len() - accepted.len(),
+        accepted.len()
+    );
 }
 
 /// The vectors are within what a careful caller allows, so that everyone can run them.
@@ -131,7 +162,8 @@ fn vectors_are_small() {
     for vector in suite() {
         assert!(vector.bytes.len() <= 1 << 17, "{}", vector.path);
         if matches!(vector.answer, Answer::Digest(_)) && vector.dictionary.is_none() {
-            selvedge::open(&vector.bytes, &Limits::default()).unwrap_or_else(|finding| panic!("{}: {finding}", vector.path));
+            selvedge::open(&vector.bytes, &Limits::default())
+                .unwrap_or_else(|finding| panic!("{}: {finding}", vector.path));
         }
     }
 }

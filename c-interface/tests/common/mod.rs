@@ -1,4 +1,5 @@
-//! What the tests share: the built libraries, the C compiler, the fixture, numbers, and the samples that the examples print.
+//! What the tests share: the built libraries, the C compiler, the fixture, numbers, and the samples that the
+//! examples print.
 
 #![allow(dead_code, reason = "each test file uses a part of this")]
 
@@ -154,8 +155,10 @@ pub fn expected_print(selvedge: &Selvedge<'_>) -> String {
     let lights = [[0.0, 0.0, 1.0], [0.6, 0.0, 0.8], [-0.28, 0.96, 0.0]].map(Direction::from_unit_vector);
     let views = [[0.0, 0.6, 0.8], [0.0, 0.0, 1.0], [-0.48, -0.36, 0.8]].map(Direction::from_unit_vector);
     let header = selvedge.header();
-    let mut out = format!("name: {}\ntexels: {} x {}\n", selvedge.metadata().name, header.width, header.height);
-    writeln!(out, "directions: {} light, {} view", header.light_count, header.view_count).expect("a string takes all");
+    let mut out =
+        format!("name: {}\ntexels: {} x {}\n", selvedge.metadata().name, header.width, header.height);
+    writeln!(out, "directions: {} light, {} view", header.light_count, header.view_count)
+        .expect("a string takes all");
     for (n, (light, view)) in (0u32..).zip(lights.into_iter().zip(views)) {
         let u_q32 = 0x1234_5678u32.wrapping_add(n.wrapping_mul(0x5000_0000));
         let v_q32 = 0x0fed_cba9u32.wrapping_add(n.wrapping_mul(0x7000_0000));

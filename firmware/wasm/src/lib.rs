@@ -30,11 +30,19 @@ pub extern "C" fn result() -> *const u8 {
 
 /// `dictionary_bytes` of `u32::MAX` stand for no dictionary.
 #[unsafe(no_mangle)]
-pub extern "C" fn answer(bytes: u32, dictionary_bytes: u32, max_bytes: u32, max_operations: u32, max_texels: u32) -> u32 {
+pub extern "C" fn answer(
+    bytes: u32,
+    dictionary_bytes: u32,
+    max_bytes: u32,
+    max_operations: u32,
+    max_texels: u32,
+) -> u32 {
     // SAFETY: the host does not write while this runs, and nothing else has these references.
     let (files, result): (&[u8; ROOM], &mut [u8; 32]) = unsafe { (&*FILES.0.get(), &mut *RESULT.0.get()) };
     let file = files.get(..bytes as usize).unwrap_or(&[]);
-    let dictionary = (dictionary_bytes != u32::MAX).then(|| files.get(bytes as usize..).and_then(|rest| rest.get(..dictionary_bytes as usize)).unwrap_or(&[]));
+    let dictionary = (dictionary_bytes != u32::MAX).then(|| {
+        files.get(bytes as usize..).and_then(|rest| rest.get(..dictionary_bytes as usize)).unwrap_or(&[])
+    });
     let limits = Limits { bytes: max_bytes, operations: max_operations, texels: max_texels };
     let finding = if file.get(16) == Some(&1) {
         let mut first = First::default();

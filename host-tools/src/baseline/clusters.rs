@@ -1,9 +1,11 @@
-//! Principal components of clusters of texels: local PCA, or per-cluster factorisation (Müller, Meseth, Klein 2003).
+//! Principal components of clusters of texels: local PCA, or per-cluster factorisation (Müller, Meseth, Klein
+//! 2003).
 //!
-//! Texels go to the cluster whose components come nearest to them, and components are found anew for the texels of a
-//! cluster, in turn. All of it happens in the space of the leading components of the whole ([`Pca`]), whose rank is the caller's
-//! choice; errors are measured on the data themselves. Clusters have a mean of their own. All factors are quantised to 8
-//! or 16 bits with a scale for each component of a cluster, and everything is counted.
+//! Texels go to the cluster whose components come nearest to them, and components are found anew for the
+//! texels of a cluster, in turn. All of it happens in the space of the leading components of the whole
+//! ([`Pca`]), whose rank is the caller's choice; errors are measured on the data themselves. Clusters have a
+//! mean of their own. All factors are quantised to 8 or 16 bits with a scale for each component of a cluster,
+//! and everything is counted.
 
 use super::Row;
 use super::decoder::{At, Blend, Decoder, Pairs, add_row};
@@ -34,7 +36,10 @@ pub struct Clusters<'a, 'd> {
 fn distance(sample: &[f32], mean: &[f32], basis: &[f32]) -> f64 {
     let rest: Vec<f32> = sample.iter().zip(mean).map(|(s, m)| s - m).collect();
     let energy: f64 = rest.iter().map(|&r| r as f64 * r as f64).sum();
-    let taken: f64 = basis.chunks(sample.len()).map(|b| b.iter().zip(&rest).map(|(b, r)| *b as f64 * *r as f64).sum::<f64>().powi(2)).sum();
+    let taken: f64 = basis
+        .chunks(sample.len())
+        .map(|b| b.iter().zip(&rest).map(|(b, r)| *b as f64 * *r as f64).sum::<f64>().powi(2))
+        .sum();
     energy - taken
 }
 
@@ -43,7 +48,8 @@ pub fn clusters<'a, 'd>(pca: &'a Pca<'d>, clusters: usize, components: usize) ->
     let (rank, texels) = (pca.rank(), pca.of_texels.len() / pca.rank());
     let sample = |i: usize| &pca.of_texels[i * rank..][..rank];
     let mut random = Random::new(1);
-    let mut means: Vec<f32> = (0..clusters).flat_map(|_| sample(random.range(0, texels as i64 - 1) as usize).to_vec()).collect();
+    let mut means: Vec<f32> =
+        (0..clusters).flat_map(|_| sample(random.range(0, texels as i64 - 1) as usize).to_vec()).collect();
     let components = components.min(rank);
     let mut bases = vec![0.0f32; clusters * components * rank];
     let mut assigned = vec![0; texels];
@@ -51,13 +57,21 @@ pub fn clusters<'a, 'd>(pca: &'a Pca<'d>, clusters: usize, components: usize) ->
         let nearest = |i: usize| {
             let of = |k: usize| {
                 // The first rounds go by means alone, as k-means does.
-                let basis = if round < ROUNDS / 3 { &[][..] } else { &bases[k * components * rank..][..components * rank] };
+                let basis = if round < ROUNDS / 3 {
+                    &[][..]
+                } else {
+                    &bases[k * components * rank..][..components * rank]
+                };
                 distance(sample(i), &means[k * rank..][..rank], basis)
             };
-            (0..clusters).map(|k| (k, of(k))).fold((0, f64::MAX), |best, next| if next.1 < best.1 { next } else { best }).0
+            (0..clusters)
+                .map(|k| (k, of(k)))
+                .fold((0, f64::MAX), |best, next| if next.1 < best.1 { next } else { best })
+                .0
         };
         assigned = (0..texels).into_par_iter().map(nearest).collect();
-        let found: Vec<(Vec<f32>, Vec<f32>)> = (0..clusters).into_par_iter().map(|k| components_of(pca, &assigned, k, components)).collect();
+        let found: Vec<(Vec<f32>, Vec<f32>)> =
+            (0..clusters).into_par_iter().map(|k| components_of(pca, &assigned, k, components)).collect();
         for (k, (mean, basis)) in found.into_iter().enumerate() {
             means[k * rank..][..rank].copy_from_slice(&mean);
             bases[k * components * rank..][..components * rank].copy_from_slice(&basis);
@@ -67,9 +81,19 @@ pub fn clusters<'a, 'd>(pca: &'a Pca<'d>, clusters: usize, components: usize) ->
 }
 
 /// Mean and leading components of the texels of a cluster.
-fn components_of(pca: &Pca<'_>, assigned: &[usize], cluster: usize, components: usize) -> (Vec<f32>, Vec<f32>) {
+fn components_of(
+    pca: &Pca<'_>,
+    assigned: &[usize],
+    cluster: usize,
+    components: usize,
+) -> (Vec<f32>, Vec<f32>) {
     let rank = pca.rank();
-    let members: Vec<&[f32]> = assigned.iter().enumerate().filter(|(_, k)| **k == cluster).map(|(i, _)| &pca.of_texels[i * rank..][..rank]).collect();
+    let members: Vec<&[f32]> = assigned
+        .iter()
+        .enumerate()
+        .filter(|(_, k)| **k == cluster)
+        .map(|(i, _)| &pca.of_texels[i * rank..][..rank])
+        .collect();
     let count = members.len().max(1) as f64;
     let mut mean = vec![0.0f64; rank];
     members.iter().for_each(|member| mean.iter_mut().zip(*member).for_each(|(m, s)| *m += *s as f64 / count));
@@ -81,17 +105,20 @@ fn components_of(pca: &Pca<'_>, assigned: &[usize], cluster: usize, components: 
         }
     }
     let (basis, _) = eigenbasis(&covariance, rank);
-    let columns = (0..components).flat_map(|c| (0..rank).map(move |r| (r, c))).map(|(r, c)| basis.at(r, c)).collect();
+    let columns =
+        (0..components).flat_map(|c| (0..rank).map(move |r| (r, c))).map(|(r, c)| basis.at(r, c)).collect();
     (mean.iter().map(|&m| m as f32).collect(), columns)
 }
 
-/// Bytes at a width: the mean and components of each cluster with their scales, the number of each texel's cluster in bits, and
-/// its coefficients.
+/// Bytes at a width: the mean and components of each cluster with their scales, the number of each texel's
+/// cluster in bits, and its coefficients.
 pub fn bytes(data: &Dataset, clusters: usize, components: usize, bits: u32) -> u64 {
     let (texels, columns) = (data.description().texels() as u64, data.description().texel_len() as u64);
     let (clusters, components, width) = (clusters as u64, components as u64, bits as u64 / 8);
     let number = (64 - (clusters - 1).leading_zeros()) as u64 * texels;
-    clusters * ((components + 1) * columns * width + 8 + 8 * components) + number.div_ceil(8) + texels * components * width
+    clusters * ((components + 1) * columns * width + 8 + 8 * components)
+        + number.div_ceil(8)
+        + texels * components * width
 }
 
 impl Clusters<'_, '_> {
@@ -132,9 +159,16 @@ impl Clusters<'_, '_> {
                 let mean = &self.means[k * rank..][..rank];
                 basis.iter().zip(sample.iter().zip(mean)).map(|(b, (s, m))| b * (s - m)).sum::<f32>()
             };
-            let of_cluster: Vec<f32> = members.iter().flat_map(|&i| (0..n).map(move |c| (i, c))).map(|(i, c)| project(i, c)).collect();
+            let of_cluster: Vec<f32> = members
+                .iter()
+                .flat_map(|&i| (0..n).map(move |c| (i, c)))
+                .map(|(i, c)| project(i, c))
+                .collect();
             let rounded = quantised(&of_cluster, n.max(1), n, bits);
-            members.iter().zip(rounded.chunks(n.max(1))).for_each(|(&i, row)| coefficients[i * n..][..n].copy_from_slice(row));
+            members
+                .iter()
+                .zip(rounded.chunks(n.max(1)))
+                .for_each(|(&i, row)| coefficients[i * n..][..n].copy_from_slice(row));
         }
         let description = self.pca.dataset.description();
         Decoded {
@@ -195,7 +229,8 @@ impl Decoded {
         std::array::from_fn(|c| self.rows[start + c])
     }
 
-    /// The texels of a sample, each with its weights of mean and components; those of one cluster are put together.
+    /// The texels of a sample, each with its weights of mean and components; those of one cluster are put
+    /// together.
     #[inline(always)]
     fn gathered(&self, at: &At) -> ([(usize, f32); 4], usize) {
         let mut clusters = [(usize::MAX, 0.0); 4];
@@ -226,12 +261,17 @@ impl Decoder for Decoded {
             let pairs = Pairs::of(light, view, self.lights);
             for (i, sum) in blended.iter_mut().enumerate() {
                 *sum = [0.0; 3];
-                pairs.iter().for_each(|&(pair, weight)| add_row(sum, weight, &self.row(i / (n + 1), i % (n + 1), pair)));
+                pairs.iter().for_each(|&(pair, weight)| {
+                    add_row(sum, weight, &self.row(i / (n + 1), i % (n + 1), pair))
+                });
             }
             for (texel, rgb) in out.iter_mut().enumerate() {
                 let rows = &blended[self.assigned[texel] * (n + 1)..][..n + 1];
                 let mut sum = rows[0];
-                rows[1..].iter().zip(&self.coefficients[texel * n..]).for_each(|(row, &weight)| add_row(&mut sum, weight, row));
+                rows[1..]
+                    .iter()
+                    .zip(&self.coefficients[texel * n..])
+                    .for_each(|(row, &weight)| add_row(&mut sum, weight, row));
                 *rgb = sum.map(|y| self.domain.back(y, self.offset));
             }
         }
@@ -247,18 +287,26 @@ impl Decoder for Decoded {
                 let weight = if row == 0 {
                     of_mean
                 } else {
-                    let of =
-                        |(texel, weight): (usize, f32)| if self.assigned[texel] == cluster { weight * self.coefficients[texel * n + row - 1] } else { 0.0 };
+                    let of = |(texel, weight): (usize, f32)| {
+                        if self.assigned[texel] == cluster {
+                            weight * self.coefficients[texel * n + row - 1]
+                        } else {
+                            0.0
+                        }
+                    };
                     texels.into_iter().map(of).sum()
                 };
-                pairs.iter().for_each(|&(pair, share)| add_row(&mut sum, weight * share, &self.row(cluster, row, pair)));
+                pairs.iter().for_each(|&(pair, share)| {
+                    add_row(&mut sum, weight * share, &self.row(cluster, row, pair))
+                });
             }
         }
         sum.map(|y| self.domain.back(y, self.offset))
     }
 
     fn operations(&self, at: &At) -> u64 {
-        let (pairs, n, clusters) = (at.pairs(self.lights).len() as u64, self.components as u64, self.gathered(at).1 as u64);
+        let (pairs, n, clusters) =
+            (at.pairs(self.lights).len() as u64, self.components as u64, self.gathered(at).1 as u64);
         4 * n + pairs + clusters * (n + 1) * pairs * 4 + self.domain.operations()
     }
 }

@@ -1,4 +1,5 @@
-//! The data themselves in binary16, interpolated between nine pairs of directions and four texels: nothing is lost, and nothing is saved.
+//! The data themselves in binary16, interpolated between nine pairs of directions and four texels: nothing is
+//! lost, and nothing is saved.
 
 use super::decoder::{At, Blend, Decoder, Pairs};
 use crate::dataset::Dataset;
@@ -9,7 +10,8 @@ use half::f16;
 pub struct Uncompressed {
     /// `[texel][view][light][colour]`, binary16.
     values: Vec<u16>,
-    /// Every binary16 as binary32: a table is faster than a conversion where the compiler may not use the processor's own.
+    /// Every binary16 as binary32: a table is faster than a conversion where the compiler may not use the
+    /// processor's own.
     decoded: Vec<f32>,
     width: usize,
     lights: usize,
@@ -32,7 +34,13 @@ impl Uncompressed {
             values.extend(texel.iter().map(|&x| f16::from_f32(x.min(65_504.0)).to_bits()));
         }
         let decoded = (0..=u16::MAX).map(|bits| f16::from_bits(bits).to_f32()).collect();
-        Ok(Uncompressed { values, decoded, width: description.size[0], lights: description.lights.len(), pairs: description.pairs() })
+        Ok(Uncompressed {
+            values,
+            decoded,
+            width: description.size[0],
+            lights: description.lights.len(),
+            pairs: description.pairs(),
+        })
     }
 
     #[inline(always)]

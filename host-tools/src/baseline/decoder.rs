@@ -1,7 +1,8 @@
 //! Baselines as a renderer would use them: images at any pair of directions, and filtered samples.
 //!
-//! Every baseline becomes a [`Decoder`], made of what it would store, and is then timed and compared like a file. A filtered sample is
-//! between four texels, three lights and three views, and each decoder takes it in the order that costs least for its own layout.
+//! Every baseline becomes a [`Decoder`], made of what it would store, and is then timed and compared like a
+//! file. A filtered sample is between four texels, three lights and three views, and each decoder takes it in
+//! the order that costs least for its own layout.
 
 use super::pca::{Domain, Pca};
 use crate::linear::product_bt;
@@ -30,7 +31,8 @@ impl Blend {
         Blend { index: [taps.a, taps.b, taps.c].map(|i| i as usize), weight }
     }
 
-    /// The two nearest directions, weighed as the shader published with SparseBTF does: half of the nearest's weight fades with the ratio of distances.
+    /// The two nearest directions, weighed as the shader published with SparseBTF does: half of the nearest's
+    /// weight fades with the ratio of distances.
     pub fn two_nearest(set: &[glam::DVec3], asked: glam::DVec3) -> Blend {
         let mut near = [(0, f64::MAX); 2];
         for (i, direction) in set.iter().enumerate() {
@@ -41,7 +43,8 @@ impl Blend {
                 near[1] = (i, square);
             }
         }
-        let share = if set.len() < 2 || near[1].1 <= 0.0 { 1.0 } else { 1.0 - 0.5 * (near[0].1 / near[1].1).sqrt() };
+        let share =
+            if set.len() < 2 || near[1].1 <= 0.0 { 1.0 } else { 1.0 - 0.5 * (near[0].1 / near[1].1).sqrt() };
         Blend { index: [near[0].0, near[1].0, near[1].0], weight: [share as f32, 1.0 - share as f32, 0.0] }
     }
 
@@ -113,7 +116,8 @@ impl std::ops::Deref for Pairs {
     }
 }
 
-/// Finds what a sample is between: texels by 9.1, directions by the core's triangles, which all baselines share with the files, or by the two nearest.
+/// Finds what a sample is between: texels by 9.1, directions by the core's triangles, which all baselines
+/// share with the files, or by the two nearest.
 pub struct Locator<'a> {
     /// A file of the same directions.
     pub file: &'a Selvedge<'a>,
@@ -128,12 +132,20 @@ pub struct Locator<'a> {
 impl Locator<'_> {
     /// Lights between which a direction is.
     pub fn light(&self, direction: Direction, two_nearest: bool) -> Blend {
-        if two_nearest { Blend::two_nearest(&self.lights, vector(direction)) } else { Blend::of(self.file.locate_light(direction)) }
+        if two_nearest {
+            Blend::two_nearest(&self.lights, vector(direction))
+        } else {
+            Blend::of(self.file.locate_light(direction))
+        }
     }
 
     /// Views between which a direction is.
     pub fn view(&self, direction: Direction, two_nearest: bool) -> Blend {
-        if two_nearest { Blend::two_nearest(&self.views, vector(direction)) } else { Blend::of(self.file.locate_view(direction)) }
+        if two_nearest {
+            Blend::two_nearest(&self.views, vector(direction))
+        } else {
+            Blend::of(self.file.locate_view(direction))
+        }
     }
 
     /// Where a query is.
@@ -143,7 +155,10 @@ impl Locator<'_> {
             let axis = axis_at_position(1, 1 << 18, size as u32, position);
             let weight = |q15: i32| q15 as f32 / 32_768.0;
             if axis.count == 2 {
-                [(axis.first.block as usize, weight(axis.first.weight_a_q15)), (axis.second.block as usize, weight(axis.second.weight_a_q15))]
+                [
+                    (axis.first.block as usize, weight(axis.first.weight_a_q15)),
+                    (axis.second.block as usize, weight(axis.second.weight_a_q15)),
+                ]
             } else {
                 [(axis.first.block as usize, 1.0), (axis.first.block as usize, 0.0)]
             }
@@ -168,7 +183,8 @@ pub trait Decoder: Sync + Send {
     /// A filtered sample.
     fn filtered(&self, at: &At) -> [f32; 3];
 
-    /// Multiplications of that sample, beside those that find where it is. An exponential counts as [`EXPONENTIAL`].
+    /// Multiplications of that sample, beside those that find where it is. An exponential counts as
+    /// [`EXPONENTIAL`].
     fn operations(&self, at: &At) -> u64;
 
     /// Whether directions are interpolated between the two nearest instead of three around.
@@ -177,10 +193,12 @@ pub trait Decoder: Sync + Send {
     }
 }
 
-/// Multiplications that the exponential of a channel counts for: a polynomial of degree five, as common libraries have, and its scaling.
+/// Multiplications that the exponential of a channel counts for: a polynomial of degree five, as common
+/// libraries have, and its scaling.
 pub const EXPONENTIAL: u64 = 7;
 
-/// Multiplications of a sample's position and weights of directions, which files and baselines share; the rest of finding directions is compared apart.
+/// Multiplications of a sample's position and weights of directions, which files and baselines share; the
+/// rest of finding directions is compared apart.
 pub const POSITION: u64 = 18;
 
 /// What decompositions share: the mean of each pair, and how their values become radiance.
@@ -215,12 +233,23 @@ impl Frame {
     #[inline(always)]
     pub fn mean_at(&self, at: &At) -> [f32; 3] {
         let mut sum = [0.0f32; 3];
-        at.pairs(self.lights).iter().for_each(|&(pair, weight)| add_row(&mut sum, weight, &self.mean[pair * 3..][..3]));
+        at.pairs(self.lights)
+            .iter()
+            .for_each(|&(pair, weight)| add_row(&mut sum, weight, &self.mean[pair * 3..][..3]));
         sum
     }
 
-    /// Images of the mean and of products: `rows` are `[light][colour][column]`, `texels` are `[texel][column]`.
-    pub fn images(&self, lights: &[Blend], view: Blend, rows: &[f32], texels: &[f32], columns: usize, out: &mut [[f32; 3]]) {
+    /// Images of the mean and of products: `rows` are `[light][colour][column]`, `texels` are
+    /// `[texel][column]`.
+    pub fn images(
+        &self,
+        lights: &[Blend],
+        view: Blend,
+        rows: &[f32],
+        texels: &[f32],
+        columns: usize,
+        out: &mut [[f32; 3]],
+    ) {
         let count = out.len() / lights.len();
         let mut values = vec![0.0f32; lights.len() * 3 * count];
         for (&light, values) in lights.iter().zip(values.chunks_mut(3 * count)) {
@@ -267,17 +296,25 @@ mod tests {
     use crate::random::Random;
     use selvedge::Limits;
 
-    /// Every decoder gives the errors that its baseline measures in its own way, and a filtered sample is the blend of what the images have.
+    /// Every decoder gives the errors that its baseline measures in its own way, and a filtered sample is the
+    /// blend of what the images have.
     #[test]
     fn decoders_agree_with_their_baselines_and_samples_with_images() {
         let folder = tempfile::tempdir().expect("a folder");
         let dataset = small(folder.path(), [21, 12]);
         let description = dataset.description();
-        let prepared = prepare(vec![&dataset], TransferModel::Log2 { offset: 0.01 }, &|_, _| ()).expect("prepared");
+        let prepared =
+            prepare(vec![&dataset], TransferModel::Log2 { offset: 0.01 }, &|_, _| ()).expect("prepared");
         let options = Options { goal: Goal::Size(8000), ..Options::default() };
-        let bytes = encode(&prepared, &prepared.own_ensembles(4), &options, &|_, _| ()).expect("encoded").bytes;
+        let bytes =
+            encode(&prepared, &prepared.own_ensembles(4), &options, &|_, _| ()).expect("encoded").bytes;
         let file = selvedge::open(&bytes, &Limits::NONE).unwrap_or_else(|finding| panic!("{finding}"));
-        let locator = Locator { file: &file, size: description.size, lights: description.lights.clone(), views: description.views.clone() };
+        let locator = Locator {
+            file: &file,
+            size: description.size,
+            lights: description.lights.clone(),
+            views: description.views.clone(),
+        };
 
         for domain in [Domain::Linear, Domain::Log] {
             let mut components = pca::pca(&dataset, domain, 12).expect("made");
@@ -291,41 +328,75 @@ mod tests {
             let all: [(Box<dyn Decoder>, Option<crate::baseline::Row>); 5] = [
                 (Box::new(components.decoder(3, 8)), Some(of_three)),
                 (Box::new(clustered.decoder(8)), Some(clustered.measure(8).expect("measured"))),
-                (Box::new(decomposed.decoder(4, 9, 16)), Some(decomposed.measure(4, 9, 16).expect("measured"))),
+                (
+                    Box::new(decomposed.decoder(4, 9, 16)),
+                    Some(decomposed.measure(4, 9, 16).expect("measured")),
+                ),
                 (Box::new(layout.decoder(40)), Some(of_layout)),
                 (Box::new(data::Uncompressed::new(&dataset).expect("read")), None),
             ];
             let mut random = Random::new(3);
             for (number, (decoder, row)) in all.iter().enumerate() {
                 let source = Source::Baseline(decoder.as_ref(), &locator);
-                let metrics = compare(Source::Data(&dataset), source, description, dataset.statistics().log_offset(), None, &|_, _| ()).expect("compared");
+                let metrics = compare(
+                    Source::Data(&dataset),
+                    source,
+                    description,
+                    dataset.statistics().log_offset(),
+                    None,
+                    &|_, _| (),
+                )
+                .expect("compared");
                 match row {
                     Some(row) => {
                         assert_eq!(row.bytes, decoder.bytes());
-                        assert!((row.linear_rms / metrics.linear_rms - 1.0).abs() < 1e-3, "{number}: {row:?} {metrics:?}");
-                        assert!((row.log_rms / metrics.log_rms - 1.0).abs() < 1e-3, "{number}: {row:?} {metrics:?}");
+                        assert!(
+                            (row.linear_rms / metrics.linear_rms - 1.0).abs() < 1e-3,
+                            "{number}: {row:?} {metrics:?}"
+                        );
+                        assert!(
+                            (row.log_rms / metrics.log_rms - 1.0).abs() < 1e-3,
+                            "{number}: {row:?} {metrics:?}"
+                        );
                     }
                     // What binary16 rounds.
                     None => assert!(metrics.log_rms < 1e-3, "{metrics:?}"),
                 }
-                // Between lights and views, at a texel: an image; between texels too: four of them, where values are not bent by a logarithm.
+                // Between lights and views, at a texel: an image; between texels too: four of them, where
+                // values are not bent by a logarithm.
                 let mut images = vec![[0.0; 3]; description.texels()];
                 let mut compared = 0;
                 for _ in 0..20 {
                     let (light, view) = (random.range(0, 7) as usize, random.range(0, 4) as usize);
                     let weight = [0.5, 0.25, 0.25];
-                    let (light, view) = (Blend { index: [light, light + 1, light], weight }, Blend { index: [view, view + 1, view], weight });
+                    let (light, view) = (
+                        Blend { index: [light, light + 1, light], weight },
+                        Blend { index: [view, view + 1, view], weight },
+                    );
                     decoder.images(&[light], view, &mut images);
                     let (x, y) = (random.range(0, 19) as usize, random.range(0, 10) as usize);
                     let bent = domain == Domain::Log || number == 3;
                     let weights = if bent && number != 4 { [1.0, 0.0] } else { [0.25, 0.75] };
-                    let at = At { x: [(x, weights[0]), (x + 1, weights[1])], y: [(y, weights[0]), (y + 1, weights[1])], light, view };
+                    let at = At {
+                        x: [(x, weights[0]), (x + 1, weights[1])],
+                        y: [(y, weights[0]), (y + 1, weights[1])],
+                        light,
+                        view,
+                    };
                     let (found, mut wanted) = (decoder.filtered(&at), [0.0f32; 3]);
-                    at.texels(21).iter().for_each(|&(texel, weight)| add_row(&mut wanted, weight, &images[texel]));
-                    // Values below zero are cut at each texel of an image, and once of a sample: colours with such a texel say nothing.
-                    for c in (0..3).filter(|&c| at.texels(21).iter().all(|&(texel, _)| images[texel][c] > 0.0)) {
+                    at.texels(21)
+                        .iter()
+                        .for_each(|&(texel, weight)| add_row(&mut wanted, weight, &images[texel]));
+                    // Values below zero are cut at each texel of an image, and once of a sample: colours with
+                    // such a texel say nothing.
+                    for c in
+                        (0..3).filter(|&c| at.texels(21).iter().all(|&(texel, _)| images[texel][c] > 0.0))
+                    {
                         compared += 1;
-                        assert!((found[c] - wanted[c]).abs() < 1e-4 * (1.0 + wanted[c].abs()), "{number} {domain:?}: {found:?} {wanted:?}");
+                        assert!(
+                            (found[c] - wanted[c]).abs() < 1e-4 * (1.0 + wanted[c].abs()),
+                            "{number} {domain:?}: {found:?} {wanted:?}"
+                        );
                     }
                     assert!(decoder.operations(&at) > 0);
                 }

@@ -1,10 +1,11 @@
 //! What the encoder is measured against: older ways to store the same data, in honest floats.
 //!
-//! [`pca`] is a truncated singular value decomposition, quantised to 8 or 16 bits; [`clusters`] has one for each cluster of
-//! texels; [`tucker`] is the decomposition along all modes; [`data`] are the data themselves. [`published`] is the
-//! layout of SparseBTF (Kavoosighafi et al. 2023, sections 3.1 to 3.4). All are decoded from what they would store, and
-//! compared by the metrics of [`crate::measure`]: root mean squared errors of linear radiance and of `ln(x + e)` over all
-//! values, where `e` is the dataset's [`log_offset`](crate::dataset::Statistics::log_offset). Neither writes a file.
+//! [`pca`] is a truncated singular value decomposition, quantised to 8 or 16 bits; [`clusters`] has one for
+//! each cluster of texels; [`tucker`] is the decomposition along all modes; [`data`] are the data themselves.
+//! [`published`] is the layout of SparseBTF (Kavoosighafi et al. 2023, sections 3.1 to 3.4). All are decoded
+//! from what they would store, and compared by the metrics of [`crate::measure`]: root mean squared errors of
+//! linear radiance and of `ln(x + e)` over all values, where `e` is the dataset's
+//! [`log_offset`](crate::dataset::Statistics::log_offset). Neither writes a file.
 
 pub mod clusters;
 pub mod data;
@@ -68,7 +69,13 @@ pub(crate) mod tests {
     pub fn small(folder: &Path, size: [usize; 2]) -> Dataset {
         let lights = directions::grid(81).expect("known")[..9].to_vec();
         let path = folder.join("a.selvset");
-        let description = Description { size, views: lights[..6].to_vec(), lights, sample: Sample::Float, ..Description::default() };
+        let description = Description {
+            size,
+            views: lights[..6].to_vec(),
+            lights,
+            sample: Sample::Float,
+            ..Description::default()
+        };
         let mut random = Random::new(7);
         let wave = |i: usize, k: usize| ((i * (k + 2)) as f32 * 0.37).sin();
         let value = |texel: usize, i: usize| {

@@ -1,9 +1,10 @@
 //! Principal components: one matrix, a row for each texel and a column for each pair and colour.
 //!
-//! The matrix holds `ln(x + e)`, or `x` itself, less its mean row (the mean ABRDF). Its leading singular vectors are found by block power
-//! iteration with a random start (Halko, Martinsson, Tropp 2011, algorithm 4.4); each iteration is one pass over the data,
-//! so that the matrix is never held. Both factors and the mean are quantised to 8 or 16 bits, a scale for each component
-//! and factor, and everything is counted. Singular values are in the factor over texels.
+//! The matrix holds `ln(x + e)`, or `x` itself, less its mean row (the mean ABRDF). Its leading singular
+//! vectors are found by block power iteration with a random start (Halko, Martinsson, Tropp 2011, algorithm
+//! 4.4); each iteration is one pass over the data, so that the matrix is never held. Both factors and the
+//! mean are quantised to 8 or 16 bits, a scale for each component and factor, and everything is counted.
+//! Singular values are in the factor over texels.
 
 use super::decoder::{At, Blend, Decoder, EXPONENTIAL, Frame, Pairs, add_row, dot};
 use super::{Row, Sums};
@@ -103,7 +104,11 @@ impl Decoder for Decoded {
         let mut rows = vec![0.0f32; lights.len() * 3 * rank];
         for (i, &light) in lights.iter().enumerate() {
             for &(pair, weight) in Pairs::of(light, view, self.frame.lights).iter() {
-                add_row(&mut rows[i * 3 * rank..][..3 * rank], weight, &self.of_pairs[pair * 3 * rank..][..3 * rank]);
+                add_row(
+                    &mut rows[i * 3 * rank..][..3 * rank],
+                    weight,
+                    &self.of_pairs[pair * 3 * rank..][..3 * rank],
+                );
             }
         }
         self.frame.images(lights, view, &rows, &self.of_texels, rank, out);
@@ -120,10 +125,13 @@ impl Decoder for Decoded {
             let part = (self.rank - first).min(MOST);
             let blended = &mut blended[..part];
             blended.fill(0.0);
-            texels.iter().for_each(|&(texel, weight)| add_row(blended, weight, &self.of_texels[texel * self.rank + first..][..part]));
+            texels.iter().for_each(|&(texel, weight)| {
+                add_row(blended, weight, &self.of_texels[texel * self.rank + first..][..part])
+            });
             for &(pair, weight) in pairs.iter() {
                 for (c, sum) in sum.iter_mut().enumerate() {
-                    *sum += weight * dot(blended, &self.of_pairs[(pair * 3 + c) * self.rank + first..][..part]);
+                    *sum +=
+                        weight * dot(blended, &self.of_pairs[(pair * 3 + c) * self.rank + first..][..part]);
                 }
             }
             first += part;
@@ -144,12 +152,23 @@ thread_local! {
 }
 
 /// Work on the linear values of batches of texels, results in the order of the texels.
-pub(super) fn pass<T: Send, A>(dataset: &Dataset, work: impl Fn(usize, &[f32]) -> T + Sync, total: A, fold: impl FnMut(&mut A, T)) -> Result<A> {
+pub(super) fn pass<T: Send, A>(
+    dataset: &Dataset,
+    work: impl Fn(usize, &[f32]) -> T + Sync,
+    total: A,
+    fold: impl FnMut(&mut A, T),
+) -> Result<A> {
     pass_in(WAVE, dataset, work, total, fold)
 }
 
 /// As [`pass`], with so many batches at once.
-fn pass_in<T: Send, A>(wave: usize, dataset: &Dataset, work: impl Fn(usize, &[f32]) -> T + Sync, total: A, mut fold: impl FnMut(&mut A, T)) -> Result<A> {
+fn pass_in<T: Send, A>(
+    wave: usize,
+    dataset: &Dataset,
+    work: impl Fn(usize, &[f32]) -> T + Sync,
+    total: A,
+    mut fold: impl FnMut(&mut A, T),
+) -> Result<A> {
     let (texels, columns) = (dataset.description().texels(), dataset.description().texel_len());
     let part = |i: usize| -> Result<T> {
         let count = BATCH.min(texels - i * BATCH);
@@ -168,7 +187,8 @@ pub const MEMORY: usize = 4 << 30;
 /// What `memory` bytes allow: how many of `max_rank` components, and how many batches at once.
 fn fit_in(memory: usize, [texels, columns]: [usize; 2], max_rank: usize) -> (usize, usize) {
     let wide = |rank: usize| rank + (rank / OVERSAMPLING.0).max(OVERSAMPLING.1);
-    // Of a direction of the iteration: its sums, two matrices of the decomposition and the result over the pairs; its part and two results over texels.
+    // Of a direction of the iteration: its sums, two matrices of the decomposition and the result over the
+    // pairs; its part and two results over texels.
     let held = |rank: usize| wide(rank).saturating_mul(columns * (8 + 8 + 8 + 4) + texels * 12);
     // Of a batch: its values twice, and what it adds.
     let batch = |rank: usize| columns * (2 * BATCH + wide(rank)) * 4;
@@ -191,8 +211,8 @@ pub fn pca(dataset: &Dataset, domain: Domain, max_rank: usize) -> Result<Pca<'_>
     pca_within(dataset, domain, max_rank, MEMORY)
 }
 
-/// The same within some bytes of memory, whatever the size of the data. First fewer batches are worked on at once, which changes no bit; where not
-/// even one fits, there are fewer components.
+/// The same within some bytes of memory, whatever the size of the data. First fewer batches are worked on at
+/// once, which changes no bit; where not even one fits, there are fewer components.
 ///
 /// # Errors
 /// As [`pca`].
@@ -202,10 +222,14 @@ pub fn pca_within(dataset: &Dataset, domain: Domain, max_rank: usize, memory: us
     let forward = |x: f32| domain.forward(x, offset);
     let sums = |_: usize, values: &[f32]| {
         let mut sum = vec![0.0f64; columns];
-        values.chunks(columns).for_each(|texel| sum.iter_mut().zip(texel).for_each(|(sum, &x)| *sum += forward(x) as f64));
+        values
+            .chunks(columns)
+            .for_each(|texel| sum.iter_mut().zip(texel).for_each(|(sum, &x)| *sum += forward(x) as f64));
         sum
     };
-    let add = |total: &mut Vec<f64>, sum: Vec<f64>| total.iter_mut().zip(sum).for_each(|(total, sum)| *total += sum);
+    let add = |total: &mut Vec<f64>, sum: Vec<f64>| {
+        total.iter_mut().zip(sum).for_each(|(total, sum)| *total += sum)
+    };
     let sum = pass(dataset, sums, vec![0.0; columns], add)?;
     let mean: Vec<f32> = sum.iter().map(|sum| (sum / texels as f64) as f32).collect();
 
@@ -215,8 +239,12 @@ pub fn pca_within(dataset: &Dataset, domain: Domain, max_rank: usize, memory: us
     let mut random = Random::new(1);
     let start: Vec<f64> = (0..columns * wide).map(|_| random.range(-1_000_000, 1_000_000) as f64).collect();
     let mut q = orthonormal(&start, wide);
-    let centred =
-        |values: &[f32]| -> Vec<f32> { values.chunks(columns).flat_map(|texel| texel.iter().zip(&mean).map(|(&x, mean)| forward(x) - mean)).collect() };
+    let centred = |values: &[f32]| -> Vec<f32> {
+        values
+            .chunks(columns)
+            .flat_map(|texel| texel.iter().zip(&mean).map(|(&x, mean)| forward(x) - mean))
+            .collect()
+    };
     for _ in 0..PASSES {
         let work = |_: usize, values: &[f32]| {
             let matrix = centred(values);
@@ -227,7 +255,9 @@ pub fn pca_within(dataset: &Dataset, domain: Domain, max_rank: usize, memory: us
             product_at(&mut back, &matrix, &projected, [columns, count, wide], false);
             back
         };
-        let add = |total: &mut Vec<f64>, part: Vec<f32>| total.iter_mut().zip(part).for_each(|(total, part)| *total += part as f64);
+        let add = |total: &mut Vec<f64>, part: Vec<f32>| {
+            total.iter_mut().zip(part).for_each(|(total, part)| *total += part as f64)
+        };
         q = orthonormal(&pass_in(wave, dataset, work, vec![0.0; columns * wide], add)?, wide);
     }
     // In the subspace the singular vectors are those of a small matrix.
@@ -241,11 +271,17 @@ pub fn pca_within(dataset: &Dataset, domain: Domain, max_rank: usize, memory: us
         (projected, gram, matrix.iter().map(|&v| (v as f64).powi(2)).sum::<f64>())
     };
     let start = (Vec::new(), vec![0.0; wide * wide], 0.0);
-    let (projected, gram, energy) = pass_in(wave, dataset, work, start, |(all, gram, energy), (projected, part, of_part): (Vec<f32>, Vec<f32>, f64)| {
-        all.extend(projected);
-        gram.iter_mut().zip(part).for_each(|(total, part): (&mut f64, f32)| *total += part as f64);
-        *energy += of_part;
-    })?;
+    let (projected, gram, energy) = pass_in(
+        wave,
+        dataset,
+        work,
+        start,
+        |(all, gram, energy), (projected, part, of_part): (Vec<f32>, Vec<f32>, f64)| {
+            all.extend(projected);
+            gram.iter_mut().zip(part).for_each(|(total, part): (&mut f64, f32)| *total += part as f64);
+            *energy += of_part;
+        },
+    )?;
     let (turn, energies) = eigenbasis(&gram, wide);
     let turn = turn.first(rank);
     let mut of_texels = vec![0.0; texels * rank];
@@ -256,14 +292,21 @@ pub fn pca_within(dataset: &Dataset, domain: Domain, max_rank: usize, memory: us
 }
 
 /// Errors of texels that `decode` gives in the domain of the components.
-pub(super) fn decode_and_compare(pca: &Pca<'_>, bytes: u64, decode: &(dyn Fn(usize, &mut [f32]) + Sync)) -> Result<Row> {
+pub(super) fn decode_and_compare(
+    pca: &Pca<'_>,
+    bytes: u64,
+    decode: &(dyn Fn(usize, &mut [f32]) + Sync),
+) -> Result<Row> {
     let (columns, offset) = (pca.mean.len(), pca.dataset.statistics().log_offset());
     let work = |first: usize, values: &[f32]| {
         let mut decoded = vec![0.0; columns];
         let mut sums = Sums::default();
         for (i, texel) in values.chunks(columns).enumerate() {
             decode(first + i, &mut decoded);
-            texel.iter().zip(&decoded).for_each(|(&wanted, &found)| sums.compare(wanted, pca.domain.back(found, offset), offset));
+            texel
+                .iter()
+                .zip(&decoded)
+                .for_each(|(&wanted, &found)| sums.compare(wanted, pca.domain.back(found, offset), offset));
         }
         sums
     };
@@ -278,7 +321,10 @@ pub(super) fn quantised(factor: &[f32], all: usize, rank: usize, bits: u32) -> V
         largest.iter_mut().zip(row).for_each(|(largest, v)| *largest = largest.max(v.abs()));
     }
     let scales: Vec<f32> = largest.iter().map(|largest| largest.max(1e-30) / most).collect();
-    factor.chunks(all).flat_map(|row| row.iter().zip(&scales).map(|(v, scale)| (v / scale).round() * scale)).collect()
+    factor
+        .chunks(all)
+        .flat_map(|row| row.iter().zip(&scales).map(|(v, scale)| (v / scale).round() * scale))
+        .collect()
 }
 
 impl Pca<'_> {
@@ -287,7 +333,8 @@ impl Pca<'_> {
         self.rank
     }
 
-    /// The mean over the texels, rows of texels and rows of pairs, `[view][light][colour]`, which are orthonormal columns; each row has [`Pca::rank`] numbers.
+    /// The mean over the texels, rows of texels and rows of pairs, `[view][light][colour]`, which are
+    /// orthonormal columns; each row has [`Pca::rank`] numbers.
     pub fn factors(&self) -> (&[f32], &[f32], &[f32]) {
         (&self.mean, &self.of_texels, &self.of_pairs)
     }
@@ -327,10 +374,19 @@ impl Pca<'_> {
                 logs.chunks_mut(columns).for_each(|texel| texel.copy_from_slice(&mean));
                 let count = values.len() / columns;
                 if rank > 0 {
-                    product_bt(logs, &of_texels[first * rank..][..count * rank], &of_pairs, [count, rank, columns], true);
+                    product_bt(
+                        logs,
+                        &of_texels[first * rank..][..count * rank],
+                        &of_pairs,
+                        [count, rank, columns],
+                        true,
+                    );
                 }
                 let mut sums = Sums::default();
-                values.iter().zip(logs).for_each(|(&wanted, log)| sums.compare(wanted, self.domain.back(*log, offset), offset));
+                values
+                    .iter()
+                    .zip(logs)
+                    .for_each(|(&wanted, log)| sums.compare(wanted, self.domain.back(*log, offset), offset));
                 sums
             })
         };
@@ -347,7 +403,10 @@ impl Pca<'_> {
         let largest = self.mean.iter().copied().fold(f32::MIN, f32::max);
         let scale = (largest - least).max(1e-30) / ((1u32 << bits) - 1) as f32;
         Decoded {
-            frame: Frame::new(self, self.mean.iter().map(|m| least + ((m - least) / scale).round() * scale).collect()),
+            frame: Frame::new(
+                self,
+                self.mean.iter().map(|m| least + ((m - least) / scale).round() * scale).collect(),
+            ),
             of_texels: quantised(&self.of_texels, self.rank, rank, bits),
             of_pairs: quantised(&self.of_pairs, self.rank, rank, bits),
             rank,
@@ -387,7 +446,9 @@ impl Pca<'_> {
         let mut best: Option<Choice> = None;
         for bits in WIDTHS {
             // A wider one is of use only if it needs fewer bytes.
-            let most = (0..=self.rank).rev().find(|&rank| best.is_none_or(|best| self.bytes(rank, bits) < best.row.bytes));
+            let most = (0..=self.rank)
+                .rev()
+                .find(|&rank| best.is_none_or(|best| self.bytes(rank, bits) < best.row.bytes));
             let Some(most) = most else { continue };
             if let Some(rank) = self.least_rank(bits, rms, most)? {
                 best = Some(Choice { rank, bits, row: self.measure(rank, bits)? });
@@ -435,7 +496,9 @@ mod tests {
         let within = |memory| pca_within(&dataset, Domain::Log, 12, memory).expect("made");
         let (all, tight, few) = (within(MEMORY), within(260_000), within(150_000));
         assert_eq!([fit_in(MEMORY, [252, 162], 12), fit_in(260_000, [252, 162], 12)], [(12, WAVE), (12, 1)]);
-        let bits = |pca: &Pca<'_>| -> Vec<u32> { pca.of_texels.iter().chain(&pca.of_pairs).map(|v| v.to_bits()).collect() };
+        let bits = |pca: &Pca<'_>| -> Vec<u32> {
+            pca.of_texels.iter().chain(&pca.of_pairs).map(|v| v.to_bits()).collect()
+        };
         assert!(bits(&all) == bits(&tight));
         assert!((1..12).contains(&few.rank()), "{}", few.rank());
     }
@@ -445,7 +508,8 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let dataset = small(folder.path(), [21, 12]);
         let mut pca = pca(&dataset, Domain::Log, 12).expect("made");
-        let errors: Vec<f64> = [0, 1, 2, 3].map(|rank| pca.measure(rank, 16).expect("measured").log_rms).to_vec();
+        let errors: Vec<f64> =
+            [0, 1, 2, 3].map(|rank| pca.measure(rank, 16).expect("measured").log_rms).to_vec();
         assert!(errors.windows(2).all(|pair| pair[1] < pair[0] * 0.95), "{errors:?}");
         assert!(errors[3] < 0.05 * errors[0], "{errors:?}");
         (0..4).for_each(|rank| assert!((errors[rank] - pca.predicted_rms(rank)).abs() < 1e-3, "{errors:?}"));

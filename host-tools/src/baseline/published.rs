@@ -1,11 +1,12 @@
-//! The layout of SparseBTF as published (Kavoosighafi et al. 2023, sections 3.1, 3.3 and 3.4), decoded and measured.
+//! The layout of SparseBTF as published (Kavoosighafi et al. 2023, sections 3.1, 3.3 and 3.4), decoded and
+//! measured.
 //!
-//! `ln(x + 1e-5)`, YUV, one mean and one standard deviation for each image of a light and a view, blocks of 10 x 10 texels,
-//! a fixed number of the largest coefficients in each channel (8 : 1 : 1), five bytes a coefficient: four indices and a
-//! value. Wherever there is a choice, it is in the layout's favour: a value is a binary16 number, although one byte is
-//! counted, and [`Published::own_ensembles`] are the eigenvectors of the very material in all four modes (HOSVD, one
-//! dictionary a channel), although the published ones were trained on other materials. Ensembles are an argument, and their
-//! bytes are told apart.
+//! `ln(x + 1e-5)`, YUV, one mean and one standard deviation for each image of a light and a view, blocks of
+//! 10 x 10 texels, a fixed number of the largest coefficients in each channel (8 : 1 : 1), five bytes a
+//! coefficient: four indices and a value. Wherever there is a choice, it is in the layout's favour: a value
+//! is a binary16 number, although one byte is counted, and [`Published::own_ensembles`] are the eigenvectors
+//! of the very material in all four modes (HOSVD, one dictionary a channel), although the published ones were
+//! trained on other materials. Ensembles are an argument, and their bytes are told apart.
 
 use super::decoder::{At, Blend, Decoder, EXPONENTIAL, Pairs, add_row};
 use super::{Row, Sums};
@@ -54,7 +55,8 @@ thread_local! {
     static PLANES: RefCell<Planes> = RefCell::default();
 }
 
-/// The largest coefficients of a block in one dictionary, largest first: place in `[y][x][view column][light column]` and value.
+/// The largest coefficients of a block in one dictionary, largest first: place in `[y][x][view column][light
+/// column]` and value.
 type List = Vec<(u32, f32)>;
 
 /// The coefficients of all blocks, and what was measured of them so far.
@@ -78,8 +80,11 @@ impl<'a> Published<'a> {
     /// # Errors
     /// If the data cannot be read.
     pub fn new(dataset: &'a Dataset) -> Result<Published<'a>> {
-        let (texels, pairs, batch) = (dataset.description().texels(), dataset.description().pairs(), dataset.batch());
-        let inverse = glam::DMat3::from_cols_array(&std::array::from_fn(|i| YUV_TO_RGB[i / 3][i % 3])).transpose().inverse();
+        let (texels, pairs, batch) =
+            (dataset.description().texels(), dataset.description().pairs(), dataset.batch());
+        let inverse = glam::DMat3::from_cols_array(&std::array::from_fn(|i| YUV_TO_RGB[i / 3][i % 3]))
+            .transpose()
+            .inverse();
         let from_rgb = std::array::from_fn(|r| std::array::from_fn(|c| inverse.row(r)[c] as f32));
         let mut published = Published { dataset, means: Vec::new(), deviations: Vec::new(), from_rgb };
         let work = |i: usize| -> Result<Vec<[f64; 2]>> {
@@ -95,9 +100,14 @@ impl<'a> Published<'a> {
             }
             Ok(sums)
         };
-        let sums = ordered(texels.div_ceil(batch), work, vec![[0.0; 2]; pairs], |total: &mut Vec<[f64; 2]>, _, part| {
-            total.iter_mut().zip(part).for_each(|(total, part)| (0..2).for_each(|k| total[k] += part[k]));
-        })?;
+        let sums = ordered(
+            texels.div_ceil(batch),
+            work,
+            vec![[0.0; 2]; pairs],
+            |total: &mut Vec<[f64; 2]>, _, part| {
+                total.iter_mut().zip(part).for_each(|(total, part)| (0..2).for_each(|k| total[k] += part[k]));
+            },
+        )?;
         let count = (3 * texels) as f64;
         let half = |x: f64| f16::from_f64(x).to_f32();
         published.means = sums.iter().map(|sums| half(sums[0] / count)).collect();
@@ -121,8 +131,14 @@ impl<'a> Published<'a> {
         self.counts()[0] * self.counts()[1]
     }
 
-    /// Visits the linear colours of a block: `visit(place in [y][x][pair], pair, colour, whether the texel is in the image)`.
-    fn visit(&self, block: usize, reader: &mut Reader, mut visit: impl FnMut(usize, usize, [f32; 3], bool)) -> Result<()> {
+    /// Visits the linear colours of a block: `visit(place in [y][x][pair], pair, colour, whether the texel is
+    /// in the image)`.
+    fn visit(
+        &self,
+        block: usize,
+        reader: &mut Reader,
+        mut visit: impl FnMut(usize, usize, [f32; 3], bool),
+    ) -> Result<()> {
         let description = self.dataset.description();
         let ([width, height], pairs) = (description.size, description.pairs());
         let (left, top) = (block % self.counts()[0] * EDGE, block / self.counts()[0] * EDGE);
@@ -135,7 +151,12 @@ impl<'a> Published<'a> {
             for x in 0..EDGE {
                 let real = x < inside && top + y < height;
                 let texel = &reader.run[x.min(inside - 1) * pairs * 3..][..pairs * 3];
-                texel.as_chunks::<3>().0.iter().enumerate().for_each(|(pair, &rgb)| visit((y * EDGE + x) * pairs + pair, pair, rgb, real));
+                texel
+                    .as_chunks::<3>()
+                    .0
+                    .iter()
+                    .enumerate()
+                    .for_each(|(pair, &rgb)| visit((y * EDGE + x) * pairs + pair, pair, rgb, real));
             }
         }
         Ok(())
@@ -150,12 +171,14 @@ impl<'a> Published<'a> {
         })
     }
 
-    /// One dictionary a channel: the material's own eigenvectors in all four modes (HOSVD) of the normalised data.
+    /// One dictionary a channel: the material's own eigenvectors in all four modes (HOSVD) of the normalised
+    /// data.
     ///
     /// # Errors
     /// If the data cannot be read.
     pub fn own_ensembles(&self) -> Result<[Ensemble; 3]> {
-        let (lights, views) = (self.dataset.description().lights.len(), self.dataset.description().views.len());
+        let (lights, views) =
+            (self.dataset.description().lights.len(), self.dataset.description().views.len());
         let pairs = lights * views;
         let work = |block: usize| -> Result<[[Vec<f32>; 4]; 3]> {
             let mut planes: [Vec<f32>; 3] = Default::default();
@@ -163,13 +186,18 @@ impl<'a> Published<'a> {
             Ok(planes.map(|plane| {
                 let mut grams = [lights, views, EDGE, EDGE].map(|n| vec![0.0; n * n]);
                 product_at(&mut grams[0], &plane, &plane, [lights, EDGE * EDGE * views, lights], false);
-                plane.chunks(pairs).for_each(|texel| product_bt(&mut grams[1], texel, texel, [views, lights, views], true));
-                plane.chunks(EDGE * pairs).for_each(|row| product_bt(&mut grams[2], row, row, [EDGE, pairs, EDGE], true));
+                plane
+                    .chunks(pairs)
+                    .for_each(|texel| product_bt(&mut grams[1], texel, texel, [views, lights, views], true));
+                plane
+                    .chunks(EDGE * pairs)
+                    .for_each(|row| product_bt(&mut grams[2], row, row, [EDGE, pairs, EDGE], true));
                 product_bt(&mut grams[3], &plane, &plane, [EDGE, EDGE * pairs, EDGE], false);
                 grams
             }))
         };
-        let start: [[Vec<f64>; 4]; 3] = std::array::from_fn(|_| [lights, views, EDGE, EDGE].map(|n| vec![0.0; n * n]));
+        let start: [[Vec<f64>; 4]; 3] =
+            std::array::from_fn(|_| [lights, views, EDGE, EDGE].map(|n| vec![0.0; n * n]));
         let grams = ordered(self.blocks(), work, start, |total, _, part| {
             for (total, part) in total.iter_mut().flatten().zip(part.iter().flatten()) {
                 total.iter_mut().zip(part).for_each(|(total, &part)| *total += part as f64);
@@ -178,7 +206,12 @@ impl<'a> Published<'a> {
         Ok(grams.map(|[light, view, x, y]| {
             let basis = |gram: &[f64], n: usize| eigenbasis(gram, n).0;
             let turn = Turn { light: None, view: None, x: basis(&x, EDGE), y: basis(&y, EDGE) };
-            Ensemble { light: basis(&light, lights), view: basis(&view, views), turns: vec![turn], tables: None }
+            Ensemble {
+                light: basis(&light, lights),
+                view: basis(&view, views),
+                turns: vec![turn],
+                tables: None,
+            }
         }))
     }
 
@@ -188,10 +221,12 @@ impl<'a> Published<'a> {
         [coefficients - 2 * colour, colour, colour]
     }
 
-    /// Bytes with this many coefficients of each block: these, memberships, counts, means and standard deviations.
+    /// Bytes with this many coefficients of each block: these, memberships, counts, means and standard
+    /// deviations.
     pub fn bytes(&self, coefficients: usize) -> u64 {
         let blocks = self.blocks() as u64;
-        self.means.len() as u64 * PAIR_BYTES + blocks * (3 * BLOCK_BYTES + coefficients as u64 * COEFFICIENT_BYTES)
+        self.means.len() as u64 * PAIR_BYTES
+            + blocks * (3 * BLOCK_BYTES + coefficients as u64 * COEFFICIENT_BYTES)
     }
 
     /// Projects all blocks on the dictionaries and keeps what at most `bytes` can hold (equation 3).
@@ -201,12 +236,17 @@ impl<'a> Published<'a> {
     pub fn layout<'b>(&'b self, ensembles: &'b [Ensemble; 3], bytes: u64) -> Result<Layout<'b>> {
         let description = self.dataset.description();
         let rows = |ensemble: &Ensemble| [ensemble.light.rows, ensemble.view.rows, ensemble.edge()];
-        if ensembles.iter().any(|ensemble| rows(ensemble) != [description.lights.len(), description.views.len(), EDGE]) {
+        if ensembles
+            .iter()
+            .any(|ensemble| rows(ensemble) != [description.lights.len(), description.views.len(), EDGE])
+        {
             return Err(ToolError::Usage("these ensembles are of other directions or another edge".into()));
         }
         let fixed = self.bytes(0);
         if bytes < fixed {
-            return Err(ToolError::Usage(format!("{bytes} bytes are too few; without a coefficient the layout has {fixed}")));
+            return Err(ToolError::Usage(format!(
+                "{bytes} bytes are too few; without a coefficient the layout has {fixed}"
+            )));
         }
         let most = (((bytes - fixed) / (self.bytes(1) - fixed)) as usize).min(ensembles[0].core_len());
         let sparsity = Published::sparsity(most);
@@ -219,7 +259,11 @@ impl<'a> Published<'a> {
                 let mut list = |k: usize| {
                     ensembles[c].to_coefficients(k, &core, &mut products, &mut tensor);
                     let (limit, _) = magnitude_of_rank(&tensor, sparsity[c], &mut buckets);
-                    let mut list: List = (0u32..).zip(&tensor).filter(|(_, v)| v.abs() >= limit).map(|(i, &v)| (i, v)).collect();
+                    let mut list: List = (0u32..)
+                        .zip(&tensor)
+                        .filter(|(_, v)| v.abs() >= limit)
+                        .map(|(i, &v)| (i, v))
+                        .collect();
                     list.sort_unstable_by(|a, b| b.1.abs().total_cmp(&a.1.abs()).then(a.0.cmp(&b.0)));
                     list.truncate(sparsity[c]);
                     list.shrink_to_fit();
@@ -233,7 +277,8 @@ impl<'a> Published<'a> {
     }
 }
 
-/// Equation 4: `[y][x][view][light]` from coefficients, through the bases of lights and views and those over texels.
+/// Equation 4: `[y][x][view][light]` from coefficients, through the bases of lights and views and those over
+/// texels.
 fn decode(list: &[(u32, f32)], angular: &[Basis; 2], turn: &Turn, a: &mut Vec<f32>, b: &mut Vec<f32>) {
     let [light, view] = angular;
     let (cl, cv) = (light.columns, view.columns);
@@ -275,23 +320,37 @@ impl Layout<'_> {
         let published = self.published;
         let offset = published.dataset.statistics().log_offset();
         let sparsity = Published::sparsity(coefficients);
-        let angular: [Vec<[Basis; 2]>; 3] = self.ensembles.each_ref().map(|ensemble| (0..ensemble.turns.len()).map(|k| ensemble.angular(k)).collect());
+        let angular: [Vec<[Basis; 2]>; 3] = self
+            .ensembles
+            .each_ref()
+            .map(|ensemble| (0..ensemble.turns.len()).map(|k| ensemble.angular(k)).collect());
         let to_rgb = YUV_TO_RGB.map(|row| row.map(|m| m as f32));
         let work = |block: usize| -> Result<Sums> {
             PLANES.with_borrow_mut(|(planes, scratch, reader)| {
                 for (c, plane) in planes.iter_mut().enumerate() {
                     let kept = |list: &'_ List| sparsity[c].min(list.len());
-                    let energy = |list: &List| list[..kept(list)].iter().map(|v| (v.1 as f64).powi(2)).sum::<f64>();
+                    let energy =
+                        |list: &List| list[..kept(list)].iter().map(|v| (v.1 as f64).powi(2)).sum::<f64>();
                     let lists = &self.lists[block][c];
                     let energies: Vec<f64> = lists.iter().map(energy).collect();
-                    let k = (1..lists.len()).fold(0, |best, k| if energies[k] > energies[best] { k } else { best });
-                    decode(&lists[k][..kept(&lists[k])], &angular[c][k], &self.ensembles[c].turns[k], plane, scratch);
+                    let k = (1..lists.len())
+                        .fold(0, |best, k| if energies[k] > energies[best] { k } else { best });
+                    decode(
+                        &lists[k][..kept(&lists[k])],
+                        &angular[c][k],
+                        &self.ensembles[c].turns[k],
+                        plane,
+                        scratch,
+                    );
                 }
                 let mut sums = Sums::default();
                 published.visit(block, reader, |place, pair, rgb, real| {
                     if real {
-                        let yuv: [f32; 3] = std::array::from_fn(|c| planes[c][place] * published.deviations[pair] + published.means[pair]);
-                        let decoded = to_rgb.each_ref().map(|row| (row_times(row, yuv).exp() - LOG_OFFSET).max(0.0));
+                        let yuv: [f32; 3] = std::array::from_fn(|c| {
+                            planes[c][place] * published.deviations[pair] + published.means[pair]
+                        });
+                        let decoded =
+                            to_rgb.each_ref().map(|row| (row_times(row, yuv).exp() - LOG_OFFSET).max(0.0));
                         (0..3).for_each(|c| sums.compare(rgb[c], decoded[c], offset));
                     }
                 })?;
@@ -320,8 +379,10 @@ impl Layout<'_> {
             for c in 0..3 {
                 let kept = |k: usize| &lists[c][k][..sparsity[c].min(lists[c][k].len())];
                 let energy = |k: usize| kept(k).iter().map(|v| (v.1 as f64).powi(2)).sum::<f64>();
-                let k = (1..lists[c].len()).fold(0, |best, k| if energy(k) > energy(best) { k } else { best });
-                let (cl, cv) = (self.ensembles[c].light.columns as u32, self.ensembles[c].view.columns as u32);
+                let k =
+                    (1..lists[c].len()).fold(0, |best, k| if energy(k) > energy(best) { k } else { best });
+                let (cl, cv) =
+                    (self.ensembles[c].light.columns as u32, self.ensembles[c].view.columns as u32);
                 terms.extend(kept(k).iter().map(|&(place, value)| Term {
                     value: f16::from_f32(value).to_f32(),
                     light: (place % cl) as u16,
@@ -336,7 +397,11 @@ impl Layout<'_> {
         Decoded {
             terms,
             ends,
-            bases: self.ensembles.each_ref().map(|e| (0..e.turns.len()).map(|k| (e.angular(k), e.turns[k].x.clone(), e.turns[k].y.clone())).collect()),
+            bases: self.ensembles.each_ref().map(|e| {
+                (0..e.turns.len())
+                    .map(|k| (e.angular(k), e.turns[k].x.clone(), e.turns[k].y.clone()))
+                    .collect()
+            }),
             means: self.published.means.clone(),
             deviations: self.published.deviations.clone(),
             size: description.size,
@@ -356,7 +421,8 @@ impl Layout<'_> {
         Ok(Some((coefficients, self.measure(coefficients)?)))
     }
 
-    /// The fewest coefficients, within one part in 200, that reach an error of the logarithms; `None` if all kept do not.
+    /// The fewest coefficients, within one part in 200, that reach an error of the logarithms; `None` if all
+    /// kept do not.
     ///
     /// # Errors
     /// If the data cannot be read.
@@ -368,13 +434,15 @@ impl Layout<'_> {
             return Ok(None);
         }
         // Errors fall with coefficients, so what was measured before narrows the interval.
-        let mut high = *self.measured.iter().find(|(_, row)| row.log_rms <= log_rms).expect("the last does").0;
+        let mut high =
+            *self.measured.iter().find(|(_, row)| row.log_rms <= log_rms).expect("the last does").0;
         let mut low = self.measured.range(..high).next_back().map_or(0, |(&low, _)| low);
         let mut straight = true;
         while high - low > (high / 200).max(1) {
             let position = |n: usize| (n as f64 + 1.0).ln();
             let (a, b) = (self.measure(low)?.log_rms.ln(), self.measure(high)?.log_rms.ln());
-            // Along a straight line of logarithms, and by halves in turn, so that the interval always shrinks.
+            // Along a straight line of logarithms, and by halves in turn, so that the interval always
+            // shrinks.
             let part = if straight { (a - log_rms.ln()) / (a - b) } else { 0.5 };
             let guess = (position(low) + part * (position(high) - position(low))).exp() - 1.0;
             let margin = ((high - low) / 20).max(1);
@@ -422,7 +490,8 @@ impl Decoded {
         &self.terms[if i == 0 { 0 } else { self.ends[i - 1] }..self.ends[i]]
     }
 
-    /// The angular factor of a term between directions: the columns of each pair times its standard deviation, as the published shader has it.
+    /// The angular factor of a term between directions: the columns of each pair times its standard
+    /// deviation, as the published shader has it.
     #[inline(always)]
     fn angular(&self, channel: usize, term: &Term, light: Blend, view: Blend) -> f32 {
         let [of_lights, of_views] = &self.bases[channel][term.dictionary as usize].0;
@@ -430,7 +499,8 @@ impl Decoded {
         for (v, weight_v) in view.parts() {
             let mut inner = 0.0;
             for (l, weight_l) in light.parts() {
-                inner += weight_l * of_lights.at(l, term.light as usize) * self.deviations[v * self.lights + l];
+                inner +=
+                    weight_l * of_lights.at(l, term.light as usize) * self.deviations[v * self.lights + l];
             }
             sum += weight_v * of_views.at(v, term.view as usize) * inner;
         }
@@ -464,12 +534,16 @@ impl Decoder for Decoded {
                     let Some(first) = terms.first() else { continue };
                     let (_, x_basis, y_basis) = &self.bases[c][first.dictionary as usize];
                     let (mut core, mut rows) = ([0.0f32; EDGE * EDGE], [0.0f32; EDGE * EDGE]);
-                    terms.iter().for_each(|term| core[term.y as usize * EDGE + term.x as usize] += self.angular(c, term, light, view));
+                    terms.iter().for_each(|term| {
+                        core[term.y as usize * EDGE + term.x as usize] += self.angular(c, term, light, view)
+                    });
                     for (y, row) in rows.chunks_mut(EDGE).enumerate() {
                         (0..EDGE).for_each(|k| add_row(row, y_basis.at(y, k), &core[k * EDGE..][..EDGE]));
                     }
                     for (row, out) in rows.chunks(EDGE).zip(plane.chunks_mut(EDGE)) {
-                        out.iter_mut().enumerate().for_each(|(x, out)| *out += (0..EDGE).map(|k| x_basis.at(x, k) * row[k]).sum::<f32>());
+                        out.iter_mut().enumerate().for_each(|(x, out)| {
+                            *out += (0..EDGE).map(|k| x_basis.at(x, k) * row[k]).sum::<f32>()
+                        });
                     }
                 }
                 for y in top..height.min(top + EDGE) {
@@ -494,7 +568,9 @@ impl Decoder for Decoded {
                         let of = |basis: &Basis, part: [(usize, f32); 2], column: u8| -> f32 {
                             part.iter().map(|&(row, weight)| weight * basis.at(row, column as usize)).sum()
                         };
-                        *value += self.angular(c, term, at.light, at.view) * of(x_basis, part_x, term.x) * of(y_basis, part_y, term.y);
+                        *value += self.angular(c, term, at.light, at.view)
+                            * of(x_basis, part_x, term.x)
+                            * of(y_basis, part_y, term.y);
                     }
                 }
             }
@@ -511,7 +587,8 @@ impl Decoder for Decoded {
                 terms += (0..3).map(|c| self.terms(block_y * across + block_x, c).len() as u64).sum::<u64>();
             }
         }
-        // A term: two products for each pair of directions and one for a view, its value, two rows of two texels, and both.
+        // A term: two products for each pair of directions and one for a view, its value, two rows of two
+        // texels, and both.
         terms * (views * (2 * lights + 2) + 1 + 4 + 2) + 2 * views * lights + 9 + 3 * EXPONENTIAL
     }
 
@@ -562,7 +639,10 @@ mod tests {
         let (n, row) = layout.reach(goal * 1.0001).expect("measured").expect("reached");
         assert!(n <= 10 && row.log_rms <= goal * 1.0001);
         let bytes = data.bytes(100);
-        assert_eq!(published(&dataset, bytes).expect("measured"), layout.at(bytes).expect("measured").expect("fits").1);
+        assert_eq!(
+            published(&dataset, bytes).expect("measured"),
+            layout.at(bytes).expect("measured").expect("fits").1
+        );
         assert!(data.layout(&ensembles, 10).is_err());
     }
 

@@ -1,8 +1,10 @@
-//! N-mode singular value decomposition (Tucker; Vasilescu and Terzopoulos 2004, Wang et al. 2005): a core tensor and a matrix for each mode.
+//! N-mode singular value decomposition (Tucker; Vasilescu and Terzopoulos 2004, Wang et al. 2005): a core
+//! tensor and a matrix for each mode.
 //!
-//! Modes are x, y, view, and light with colour, as in the comparison of Ruiters and Klein (2009). Each matrix holds the leading eigenvectors of
-//! its mode's Gram matrix (HOSVD). As they store it, the spatial modes keep half of the rows and columns; to be fast, a renderer multiplies the
-//! core by them beforehand, which takes four times the memory and is what [`Decoded`] does.
+//! Modes are x, y, view, and light with colour, as in the comparison of Ruiters and Klein (2009). Each matrix
+//! holds the leading eigenvectors of its mode's Gram matrix (HOSVD). As they store it, the spatial modes keep
+//! half of the rows and columns; to be fast, a renderer multiplies the core by them beforehand, which takes
+//! four times the memory and is what [`Decoded`] does.
 
 use super::Row;
 use super::decoder::{At, Blend, Decoder, Frame, add_row, dot};
@@ -32,14 +34,20 @@ pub struct Tucker<'a, 'd> {
 pub fn tucker<'a, 'd>(pca: &'a Pca<'d>, views: usize, lights: usize) -> Result<Tucker<'a, 'd>> {
     let description = pca.dataset.description();
     let [width, height] = description.size;
-    let (view_count, light_len, columns) = (description.views.len(), description.lights.len() * 3, pca.mean.len());
+    let (view_count, light_len, columns) =
+        (description.views.len(), description.lights.len() * 3, pca.mean.len());
     let offset = pca.dataset.statistics().log_offset();
     let centred = |values: &[f32]| -> Vec<f32> {
-        values.chunks(columns).flat_map(|texel| texel.iter().zip(&pca.mean).map(|(&x, m)| pca.domain.forward(x, offset) - m)).collect()
+        values
+            .chunks(columns)
+            .flat_map(|texel| texel.iter().zip(&pca.mean).map(|(&x, m)| pca.domain.forward(x, offset) - m))
+            .collect()
     };
-    // Gram matrices of view and light; those of x and y are of the texels' products in the space of the components, which loses what they lose.
+    // Gram matrices of view and light; those of x and y are of the texels' products in the space of the
+    // components, which loses what they lose.
     let grams = |_: usize, values: &[f32]| {
-        let (mut of_views, mut of_lights) = (vec![0.0f32; view_count * view_count], vec![0.0f32; light_len * light_len]);
+        let (mut of_views, mut of_lights) =
+            (vec![0.0f32; view_count * view_count], vec![0.0f32; light_len * light_len]);
         for texel in centred(values).chunks(columns) {
             product_bt(&mut of_views, texel, texel, [view_count, light_len, view_count], true);
             product_at(&mut of_lights, texel, texel, [light_len, view_count, light_len], true);
@@ -50,12 +58,21 @@ pub fn tucker<'a, 'd>(pca: &'a Pca<'d>, views: usize, lights: usize) -> Result<T
         a.iter_mut().zip(x).for_each(|(a, x)| *a += x as f64);
         b.iter_mut().zip(y).for_each(|(b, y)| *b += y as f64);
     };
-    let (of_views, of_lights) = pass(pca.dataset, grams, (vec![0.0; view_count * view_count], vec![0.0; light_len * light_len]), add)?;
+    let (of_views, of_lights) = pass(
+        pca.dataset,
+        grams,
+        (vec![0.0; view_count * view_count], vec![0.0; light_len * light_len]),
+        add,
+    )?;
     let rank = pca.rank();
     let sample = |x: usize, y: usize| &pca.of_texels[(y * width + x) * rank..][..rank];
     let dot = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| *a as f64 * *b as f64).sum::<f64>();
-    let of_x: Vec<f64> = (0..width * width).map(|i| (0..height).map(|y| dot(sample(i / width, y), sample(i % width, y))).sum()).collect();
-    let of_y: Vec<f64> = (0..height * height).map(|i| (0..width).map(|x| dot(sample(x, i / height), sample(x, i % height))).sum()).collect();
+    let of_x: Vec<f64> = (0..width * width)
+        .map(|i| (0..height).map(|y| dot(sample(i / width, y), sample(i % width, y))).sum())
+        .collect();
+    let of_y: Vec<f64> = (0..height * height)
+        .map(|i| (0..width).map(|x| dot(sample(x, i / height), sample(x, i % height))).sum())
+        .collect();
     let kept = [width.div_ceil(2), height.div_ceil(2), views.min(view_count), lights.min(light_len)];
     let x = eigenbasis(&of_x, width).0.first(kept[0]);
     let y = eigenbasis(&of_y, height).0.first(kept[1]);
@@ -97,7 +114,12 @@ impl Tucker<'_, '_> {
         let [kx, ky, ..] = self.kept.map(|n| n as u64);
         let (v, l, width) = (views as u64, lights as u64, bits as u64 / 8);
         let rows = |basis: &Basis, columns: u64| basis.rows as u64 * columns;
-        let numbers = self.pca.mean.len() as u64 + kx * ky * v * l + rows(&self.x, kx) + rows(&self.y, ky) + rows(&self.view, v) + rows(&self.light, l);
+        let numbers = self.pca.mean.len() as u64
+            + kx * ky * v * l
+            + rows(&self.x, kx)
+            + rows(&self.y, ky)
+            + rows(&self.view, v)
+            + rows(&self.light, l);
         numbers * width + 8 + 8 * (v * l + kx + ky + v + l)
     }
 
@@ -110,9 +132,19 @@ impl Tucker<'_, '_> {
         let [kx, ky, kv, kl] = self.kept;
         let (views, lights) = (views.min(kv), lights.min(kl));
         let matrix = |basis: &Basis, columns: usize| quantised(&basis.entries, basis.columns, columns, bits);
-        let (x, y, view, light) = (matrix(&self.x, kx), matrix(&self.y, ky), matrix(&self.view, views), matrix(&self.light, lights));
+        let (x, y, view, light) = (
+            matrix(&self.x, kx),
+            matrix(&self.y, ky),
+            matrix(&self.view, views),
+            matrix(&self.light, lights),
+        );
         // A scale for each pair of angular columns.
-        let part: Vec<f32> = self.core.chunks(kv * kl).flat_map(|cell| (0..views).flat_map(move |v| &cell[v * kl..][..lights])).copied().collect();
+        let part: Vec<f32> = self
+            .core
+            .chunks(kv * kl)
+            .flat_map(|cell| (0..views).flat_map(move |v| &cell[v * kl..][..lights]))
+            .copied()
+            .collect();
         let angular = views * lights;
         let core = quantised(&part, angular, angular, bits);
         let description = self.pca.dataset.description();
@@ -122,9 +154,23 @@ impl Tucker<'_, '_> {
         product(&mut by_y, &y, &core, [height, ky, kx * angular], false);
         let mut texels = vec![0.0; height * width * angular];
         for row in 0..height {
-            product(&mut texels[row * width * angular..][..width * angular], &x, &by_y[row * kx * angular..][..kx * angular], [width, kx, angular], false);
+            product(
+                &mut texels[row * width * angular..][..width * angular],
+                &x,
+                &by_y[row * kx * angular..][..kx * angular],
+                [width, kx, angular],
+                false,
+            );
         }
-        Decoded { frame: Frame::new(self.pca, self.pca.mean.clone()), texels, view, light, views, lights, bytes: self.bytes(views, lights, bits) }
+        Decoded {
+            frame: Frame::new(self.pca, self.pca.mean.clone()),
+            texels,
+            view,
+            light,
+            views,
+            lights,
+            bytes: self.bytes(views, lights, bits),
+        }
     }
 
     /// Errors over all values, decoded from quantised factors.
@@ -136,7 +182,13 @@ impl Tucker<'_, '_> {
         let (view_count, light_len) = (view.len() / views, frame.lights * 3);
         let decode = |texel: usize, out: &mut [f32]| {
             let mut by_view = vec![0.0; view_count * lights];
-            product(&mut by_view, &view, &texels[texel * views * lights..][..views * lights], [view_count, views, lights], false);
+            product(
+                &mut by_view,
+                &view,
+                &texels[texel * views * lights..][..views * lights],
+                [view_count, views, lights],
+                false,
+            );
             out.copy_from_slice(&frame.mean);
             product_bt(out, &by_view, &light, [view_count, lights, light_len], true);
         };
@@ -181,7 +233,10 @@ impl Decoder for Decoded {
             row.iter().zip(core.chunks(l)).for_each(|(&weight, core)| add_row(out, weight, core));
         }
         let mut rows = vec![0.0; lights.len() * 3 * l];
-        lights.iter().zip(rows.chunks_mut(3 * l)).for_each(|(&light, rows)| Decoded::blended(&self.light, 3 * l, light, rows));
+        lights
+            .iter()
+            .zip(rows.chunks_mut(3 * l))
+            .for_each(|(&light, rows)| Decoded::blended(&self.light, 3 * l, light, rows));
         self.frame.images(lights, view, &rows, &by_view, l, out);
     }
 
@@ -192,7 +247,9 @@ impl Decoder for Decoded {
         Decoded::blended(&self.view, v, at.view, &mut row[..v]);
         for (texel, weight) in at.texels(self.frame.width) {
             let core = &self.texels[texel * v * self.lights..][..v * self.lights];
-            row.iter().zip(core.chunks(self.lights)).for_each(|(&of_view, core)| add_row(&mut by_view[..l], weight * of_view, core));
+            row.iter()
+                .zip(core.chunks(self.lights))
+                .for_each(|(&of_view, core)| add_row(&mut by_view[..l], weight * of_view, core));
         }
         Decoded::blended(&self.light, 3 * self.lights, at.light, &mut lights[..3 * l]);
         let mean = self.frame.mean_at(at);
@@ -202,7 +259,12 @@ impl Decoder for Decoded {
     fn operations(&self, at: &At) -> u64 {
         let (v, l) = (self.views as u64, self.lights as u64);
         let (of_views, of_lights) = (at.view.parts().count() as u64, at.light.parts().count() as u64);
-        of_views * v + 4 * (v + v * l) + of_lights * 3 * l + 3 * l + of_views * of_lights * 4 + self.frame.domain.operations()
+        of_views * v
+            + 4 * (v + v * l)
+            + of_lights * 3 * l
+            + 3 * l
+            + of_views * of_lights * 4
+            + self.frame.domain.operations()
     }
 }
 
@@ -218,10 +280,15 @@ mod tests {
         let data = small(folder.path(), [20, 12]);
         let whole = pca(&data, Domain::Linear, 40).expect("made");
         let tucker = tucker(&whole, 6, 27).expect("made");
-        let errors: Vec<f64> = [(1, 2), (2, 4), (4, 8), (6, 27)].map(|(v, l)| tucker.measure(v, l, 16).expect("measured").linear_rms).to_vec();
+        let errors: Vec<f64> = [(1, 2), (2, 4), (4, 8), (6, 27)]
+            .map(|(v, l)| tucker.measure(v, l, 16).expect("measured").linear_rms)
+            .to_vec();
         assert!(errors.windows(2).all(|pair| pair[1] <= pair[0] * 1.001), "{errors:?}");
         // With all angular columns what is lost is what half of the spatial ones cannot hold.
         assert!(errors[3] < whole.predicted_rms(0), "{errors:?}");
-        assert_eq!(tucker.bytes(2, 4, 16), (162 + 10 * 6 * 8 + 200 + 72 + 6 * 2 + 27 * 4) * 2 + 8 + 8 * (8 + 10 + 6 + 2 + 4));
+        assert_eq!(
+            tucker.bytes(2, 4, 16),
+            (162 + 10 * 6 * 8 + 200 + 72 + 6 * 2 + 27 * 4) * 2 + 8 + 8 * (8 + 10 + 6 + 2 + 4)
+        );
     }
 }

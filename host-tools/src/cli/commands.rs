@@ -25,14 +25,17 @@ use std::path::{Path, PathBuf};
 pub enum Material {
     /// Render a BTF of a modelled mesostructure into a dataset
     Synth(SynthArgs),
-    /// Write a dataset or a decoded file in a format of others: folders of EXR or PNG, a zip as UBO2003, a .btf
+    /// Write a dataset or a decoded file in a format of others: folders of EXR or PNG, a zip as UBO2003, a
+    /// .btf
     Export(ExportArgs),
     /// Train an ensemble of dictionaries on datasets, once, for materials that are not among them
     Train(TrainArgs),
     /// Encode a dataset for a goal in error, bytes or coefficients
     Encode(Box<encoding::EncodeArgs>),
     /// Compare two materials; exit codes as idiff: 0 same, 1 warning, 2 failure, 3 other sizes, 4 unreadable
-    #[command(after_help = "Exit codes: 0 within the limits, 1 beyond --warn, 2 beyond --fail, 3 other sizes, 4 unreadable.")]
+    #[command(
+        after_help = "Exit codes: 0 within the limits, 1 beyond --warn, 2 beyond --fail, 3 other sizes, 4 unreadable."
+    )]
     Compare(CompareArgs),
     /// Leave out what a scene does not need; what is left decodes to the same bits
     Trim(TrimArgs),
@@ -41,7 +44,8 @@ pub enum Material {
 }
 
 fn parse_size(text: &str) -> std::result::Result<[usize; 2], String> {
-    let parts: Option<Vec<usize>> = text.split('x').map(|n| n.parse().ok().filter(|n| (1..=16_384).contains(n))).collect();
+    let parts: Option<Vec<usize>> =
+        text.split('x').map(|n| n.parse().ok().filter(|n| (1..=16_384).contains(n))).collect();
     match parts.as_deref() {
         Some(&[side]) => Ok([side, side]),
         Some(&[width, height]) => Ok([width, height]),
@@ -74,7 +78,11 @@ pub fn parse_positive(text: &str) -> std::result::Result<f64, String> {
 /// The path of an EXR.
 fn parse_exr(text: &str) -> std::result::Result<PathBuf, String> {
     let path = PathBuf::from(text);
-    if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("exr")) { Ok(path) } else { Err("a path that ends in .exr".into()) }
+    if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("exr")) {
+        Ok(path)
+    } else {
+        Err("a path that ends in .exr".into())
+    }
 }
 
 pub fn parse_bytes(text: &str) -> std::result::Result<u64, String> {
@@ -85,7 +93,13 @@ pub fn parse_bytes(text: &str) -> std::result::Result<u64, String> {
         "M" | "MB" => 1e6,
         _ => return Err("bytes, as 200000, 200k or 1.5M".into()),
     };
-    number.parse::<f64>().ok().map(|n| n * unit).filter(|n| (1.0..=4.2e9).contains(n)).map(|n| n as u64).ok_or_else(|| "bytes, as 200000, 200k or 1.5M".into())
+    number
+        .parse::<f64>()
+        .ok()
+        .map(|n| n * unit)
+        .filter(|n| (1.0..=4.2e9).contains(n))
+        .map(|n| n as u64)
+        .ok_or_else(|| "bytes, as 200000, 200k or 1.5M".into())
 }
 
 /// Threads of the work that follows; results do not depend on it.
@@ -136,7 +150,14 @@ fn synthesise(args: SynthArgs) -> Result<u8> {
     args.threads.apply();
     let kind: Mesostructure = args.kind.parse()?;
     let sample = if args.float { Sample::Float } else { Sample::Half };
-    let request = synth::Request { kind, size: args.size, directions: args.directions, seed: args.seed, samples: args.samples, sample };
+    let request = synth::Request {
+        kind,
+        size: args.size,
+        directions: args.directions,
+        seed: args.seed,
+        samples: args.samples,
+        sample,
+    };
     let progress = Progress::new();
     synth::synthesise(&request, &args.output, &|done, all| progress.tell("rendering", done, all))?;
     progress.clear();
@@ -198,10 +219,17 @@ fn export(args: ExportArgs) -> Result<u8> {
         Given::Data(dataset) => dataset,
         given @ Given::File(..) => {
             let folder = files::folder_of(&args.output);
-            place = tempfile::Builder::new().prefix(".selvedge-").tempdir_in(folder).map_err(ToolError::io(folder))?;
+            place = tempfile::Builder::new()
+                .prefix(".selvedge-")
+                .tempdir_in(folder)
+                .map_err(ToolError::io(folder))?;
             let opened = given.opened(&args.source, &Limits::NONE)?;
-            let file = opened.as_ref().ok_or_else(|| ToolError::Usage(format!("{}: not a file to decode", args.source.display())))?;
-            expand(file, &place.path().join("all.selvset"), MEMORY, &|done, all| progress.tell("decoding", done, all))?
+            let file = opened.as_ref().ok_or_else(|| {
+                ToolError::Usage(format!("{}: not a file to decode", args.source.display()))
+            })?;
+            expand(file, &place.path().join("all.selvset"), MEMORY, &|done, all| {
+                progress.tell("decoding", done, all)
+            })?
         }
     };
     let writing = |done, all| progress.tell("writing", done, all);
@@ -212,20 +240,32 @@ fn export(args: ExportArgs) -> Result<u8> {
         }
     };
     match args.format {
-        ExportFormat::Exr => count_cut(images::export(&dataset, &args.output, images::Format::Exr, MEMORY, &writing)?),
-        ExportFormat::Png => count_cut(images::export(&dataset, &args.output, images::Format::Png, MEMORY, &writing)?),
+        ExportFormat::Exr => {
+            count_cut(images::export(&dataset, &args.output, images::Format::Exr, MEMORY, &writing)?)
+        }
+        ExportFormat::Png => {
+            count_cut(images::export(&dataset, &args.output, images::Format::Png, MEMORY, &writing)?)
+        }
         ExportFormat::Ubo2003 => {
-            let options = ubo::Options { quality: args.quality.unwrap_or(95), exposure: args.exposure.unwrap_or(1.0), memory: MEMORY };
+            let options = ubo::Options {
+                quality: args.quality.unwrap_or(95),
+                exposure: args.exposure.unwrap_or(1.0),
+                memory: MEMORY,
+            };
             let exported = ubo::export(&dataset, &args.output, &options, &writing)?;
             count_cut(exported.cut);
             if let (count @ 1.., worst) = exported.moved {
-                notes.push(format!("{count} directions are not of whole degrees: the names are up to {worst:.2} degrees off"));
+                notes.push(format!(
+                    "{count} directions are not of whole degrees: the names are up to {worst:.2} degrees off"
+                ));
             }
         }
         ExportFormat::Btf => {
             let rms = btf::write::export(&dataset, &args.output, args.components.unwrap_or(100) as usize)?;
             if dataset.description().lights.len() != dataset.description().views.len() {
-                notes.push("there are not as many lights as views, which readers made with btf.hh refuse".into());
+                notes.push(
+                    "there are not as many lights as views, which readers made with btf.hh refuse".into(),
+                );
             }
             notes.push(format!("the components leave an RMS error of {rms:.3e} of linear radiance"));
         }
@@ -249,7 +289,8 @@ fn check_output(source: &Path, output: &Path, is_folder: bool) -> Result<()> {
     if !is_folder && output.is_dir() {
         return refuse("this is a folder; a file is written");
     }
-    let is_same = source == output || source.canonicalize().is_ok_and(|a| output.canonicalize().is_ok_and(|b| a == b));
+    let is_same =
+        source == output || source.canonicalize().is_ok_and(|a| output.canonicalize().is_ok_and(|b| a == b));
     if is_same {
         return refuse("this is the source");
     }
@@ -271,7 +312,8 @@ pub struct DataArgs {
     /// Keep 32-bit floats instead of binary16
     #[arg(long)]
     float: bool,
-    /// Whether values contain the cosine of the light's angle; if not given, as the data say, and if they do not, included
+    /// Whether values contain the cosine of the light's angle; if not given, as the data say, and if they do
+    /// not, included
     #[arg(long, value_enum)]
     cosine: Option<Cosine>,
     /// Name of the material; that of the file or folder if not given
@@ -315,7 +357,9 @@ impl DataArgs {
             ("--height-map", self.height_map.is_some()),
             ("--times", self.times),
         ];
-        given.into_iter().try_for_each(|(option, is_given)| check_applies(option, is_given, false, "what becomes a dataset"))
+        given.into_iter().try_for_each(|(option, is_given)| {
+            check_applies(option, is_given, false, "what becomes a dataset")
+        })
     }
 }
 
@@ -327,11 +371,20 @@ pub fn import_data(from: &Path, kind: Kind, output: &Path, args: DataArgs) -> Re
     check_applies("--colours", args.colours.is_some(), !is_btf, "pictures")?;
     check_applies("--memory", args.memory.is_some(), !is_btf, "pictures")?;
     check_output(from, output, false)?;
-    let texts = [("--name", args.name.as_deref().unwrap_or_default()), ("--origin", &args.origin), ("--licence", &args.licence)];
-    if let Some((option, _)) = texts.iter().find(|(_, text)| text.chars().any(selvedge::metadata::is_invisible)) {
-        return Err(ToolError::Usage(format!("{option}: a character that is not seen, which no file may have")));
+    let texts = [
+        ("--name", args.name.as_deref().unwrap_or_default()),
+        ("--origin", &args.origin),
+        ("--licence", &args.licence),
+    ];
+    if let Some((option, _)) =
+        texts.iter().find(|(_, text)| text.chars().any(selvedge::metadata::is_invisible))
+    {
+        return Err(ToolError::Usage(format!(
+            "{option}: a character that is not seen, which no file may have"
+        )));
     }
-    let of_path = || from.file_stem().map_or_else(String::new, |name| foreign::clean(&name.to_string_lossy()));
+    let of_path =
+        || from.file_stem().map_or_else(String::new, |name| foreign::clean(&name.to_string_lossy()));
     let mut options = ImportOptions {
         sample: if args.float { Sample::Float } else { Sample::Half },
         cosine_included: args.cosine.map(|cosine| cosine == Cosine::Included),
@@ -347,7 +400,8 @@ pub fn import_data(from: &Path, kind: Kind, output: &Path, args: DataArgs) -> Re
         Kind::Btf => {
             let btf = btf::Btf::open(from)?;
             // Before the long work, as far as it can fail.
-            let read_heights = |path| check_output(output, path, false).and_then(|()| Ok((path, btf.height_map()?)));
+            let read_heights =
+                |path| check_output(output, path, false).and_then(|()| Ok((path, btf.height_map()?)));
             let heights = args.height_map.as_deref().map(read_heights).transpose()?;
             if options.name.is_empty() {
                 options.name = of_path();
@@ -414,7 +468,8 @@ pub struct TrainArgs {
 /// Trains; what an interrupted run has done is kept beside the output and continued.
 fn train_dictionary(args: TrainArgs) -> Result<u8> {
     args.threads.apply();
-    let datasets: Vec<Dataset> = args.datasets.iter().map(|path| Dataset::open(path)).collect::<Result<_>>()?;
+    let datasets: Vec<Dataset> =
+        args.datasets.iter().map(|path| Dataset::open(path)).collect::<Result<_>>()?;
     let options = train::Options {
         dictionaries: args.dictionaries as usize,
         sparsity: args.sparsity,
@@ -438,9 +493,16 @@ fn train_dictionary(args: TrainArgs) -> Result<u8> {
         if !args.quiet {
             let passed = begun.elapsed().as_secs_f64();
             let left = ((3 - step.channel) * options.iterations).saturating_sub(step.iteration + 1);
-            let revived = if step.revived > 0 { format!(", {} dictionaries begin anew", step.revived) } else { String::new() };
+            let revived = if step.revived > 0 {
+                format!(", {} dictionaries begin anew", step.revived)
+            } else {
+                String::new()
+            };
             let most = passed / steps as f64 * left as f64;
-            eprintln!("channel {} iteration {:2}: error {:.6} of the energy{revived}; at most {most:.0} s left", step.channel, step.iteration, step.objective);
+            eprintln!(
+                "channel {} iteration {:2}: error {:.6} of the energy{revived}; at most {most:.0} s left",
+                step.channel, step.iteration, step.objective
+            );
         }
         true
     };
@@ -449,7 +511,10 @@ fn train_dictionary(args: TrainArgs) -> Result<u8> {
     let description = datasets[0].description();
     let materials: Vec<String> = datasets.iter().map(|d| d.description().texts[0].clone()).collect();
     let name = args.output.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-    let metadata = MetadataModel { texts: [name, format!("trained on {}", materials.join(", ")), licences(&datasets)], ..MetadataModel::default() };
+    let metadata = MetadataModel {
+        texts: [name, format!("trained on {}", materials.join(", ")), licences(&datasets)],
+        ..MetadataModel::default()
+    };
     let training = Training {
         lights: description.lights.clone(),
         views: description.views.clone(),
@@ -486,9 +551,9 @@ impl Given {
     fn opened<'a>(&'a self, path: &Path, limits: &Limits) -> Result<Option<Selvedge<'a>>> {
         match self {
             Given::Data(_) => Ok(None),
-            Given::File(bytes, dictionary) => {
-                selvedge::open_with(bytes, dictionary.as_deref(), limits).map(Some).map_err(|finding| ToolError::Invalid { path: path.to_owned(), finding })
-            }
+            Given::File(bytes, dictionary) => selvedge::open_with(bytes, dictionary.as_deref(), limits)
+                .map(Some)
+                .map_err(|finding| ToolError::Invalid { path: path.to_owned(), finding }),
         }
     }
 }
@@ -529,7 +594,8 @@ pub struct CompareArgs {
     /// Write a picture: other, reference and the error in false colour, side by side
     #[arg(long)]
     picture: Option<PathBuf>,
-    /// Light of the picture: angle from the normal and azimuth, degrees; the nearest direction of the reference is taken
+    /// Light of the picture: angle from the normal and azimuth, degrees; the nearest direction of the
+    /// reference is taken
     #[arg(long, default_value = "30,0", value_parser = parse_angles, allow_hyphen_values = true)]
     light: Direction,
     /// View of the picture
@@ -580,7 +646,9 @@ fn compare(args: CompareArgs) -> Result<u8> {
         (Given::File(..), None) => unreachable!("a file is opened or refused"),
     };
     let progress = Progress::new();
-    let metrics = measure::compare(reference, other, &description, offset, args.peak, &|done, all| progress.tell("comparing", done, all))?;
+    let metrics = measure::compare(reference, other, &description, offset, args.peak, &|done, all| {
+        progress.tell("comparing", done, all)
+    })?;
     progress.clear();
     if args.json {
         print_json(&metrics)?;
@@ -588,9 +656,11 @@ fn compare(args: CompareArgs) -> Result<u8> {
         print(&text(&metrics))?;
     }
     if let Some(path) = &args.picture {
-        let [light, view] = [(&description.lights, args.light), (&description.views, args.view)].map(|(set, asked)| measure::nearest(set, asked));
+        let [light, view] = [(&description.lights, args.light), (&description.views, args.view)]
+            .map(|(set, asked)| measure::nearest(set, asked));
         let [a, b] = [reference, other].map(|source| measure::image(source, &description, light, view));
-        picture::beside_error(&b?, &a?, description.size, offset, args.white as f32, args.exposure as f32).save(path)?;
+        picture::beside_error(&b?, &a?, description.size, offset, args.white as f32, args.exposure as f32)
+            .save(path)?;
     }
     let value = match args.by {
         Limited::LogRms => metrics.log_rms,
@@ -660,7 +730,8 @@ pub struct TrimArgs {
     /// Keep views, likewise
     #[arg(long, value_parser = parse_sector)]
     views: Option<Sector>,
-    /// Let a file whose triangles are not those of this tool be triangulated anew, which changes results between directions
+    /// Let a file whose triangles are not those of this tool be triangulated anew, which changes results
+    /// between directions
     #[arg(long)]
     retriangulate: bool,
 }
@@ -677,7 +748,10 @@ fn parse_sector(text: &str) -> std::result::Result<Sector, String> {
 
 fn warn_of_triangles(path: &Path, file: &Selvedge<'_>) {
     if !read::same_triangles(file) {
-        eprintln!("warning: {}: its directions are triangulated in another way than this tool does it; decoded bits between them may change", path.display());
+        eprintln!(
+            "warning: {}: its directions are triangulated in another way than this tool does it; decoded bits between them may change",
+            path.display()
+        );
     }
 }
 
@@ -686,12 +760,22 @@ fn trim_file(args: TrimArgs) -> Result<u8> {
         // 10.8-3: what is left has the results of the original.
         if !args.retriangulate && !read::same_triangles(&file) {
             let why = "its directions are triangulated in another way than this tool does it, so results between them would change";
-            return Err(ToolError::Usage(format!("{}: {why}; --retriangulate allows it", args.source.file.display())));
+            return Err(ToolError::Usage(format!(
+                "{}: {why}; --retriangulate allows it",
+                args.source.file.display()
+            )));
         }
         Ok(read::model_of(&file))
     })?;
     let channels = args.channels.unwrap_or(Trim::default().channels);
-    let options = Trim { layers: args.layers, levels: args.levels, channels, unused: args.unused, lights: args.lights, views: args.views };
+    let options = Trim {
+        layers: args.layers,
+        levels: args.levels,
+        channels,
+        unused: args.unused,
+        lights: args.lights,
+        views: args.views,
+    };
     let trimmed = trim(&model, &options)?;
     files::write(&args.output, &write::write_material(&trimmed))?;
     Ok(0)
@@ -732,10 +816,14 @@ fn blend_files(args: BlendArgs) -> Result<u8> {
         warn_of_triangles(path, &file);
         Ok(read::model_of(&file))
     };
-    let options = Blend { exact: args.exact, most: args.most, scales_apart: args.scales_apart, ..Blend::default() };
+    let options =
+        Blend { exact: args.exact, most: args.most, scales_apart: args.scales_apart, ..Blend::default() };
     let (model, report) = blend(&open(&args.a)?, &open(&args.b)?, args.alpha, options)?;
     if report.outside > 0.0 && report.energy > 0.0 {
-        eprintln!("{:.4} % of the energy was outside of the span of the dictionaries", 100.0 * report.outside / report.energy);
+        eprintln!(
+            "{:.4} % of the energy was outside of the span of the dictionaries",
+            100.0 * report.outside / report.energy
+        );
     }
     files::write(&args.output, &write::write_material(&model))?;
     Ok(0)

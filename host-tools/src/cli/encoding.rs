@@ -108,16 +108,19 @@ pub struct EncodeArgs {
     /// How the material is stored
     #[arg(long, value_enum, default_value = "sparse-ensemble")]
     method: Method,
-    /// What --method auto chooses by, among files that reach the goal; error if the goal is a size, bytes if it is an error
+    /// What --method auto chooses by, among files that reach the goal; error if the goal is a size, bytes if
+    /// it is an error
     #[arg(long, value_enum)]
     prefer: Option<Preference>,
-    /// Sparse tensor: light atoms, ABRDF atoms, entries of a fibre and coefficients of a texel, as 64,128,8,10; chosen if not given
+    /// Sparse tensor: light atoms, ABRDF atoms, entries of a fibre and coefficients of a texel, as
+    /// 64,128,8,10; chosen if not given
     #[arg(long, value_parser = parse_shape)]
     shape: Option<[usize; 4]>,
     /// Sparse tensor: components that training works in; memory grows with them times the texels
     #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u16).range(1..=2048))]
     rank: u16,
-    /// Sparse tensor: memory of its decomposition, in MB; the less, the fewer parts at once, and then the fewer components
+    /// Sparse tensor: memory of its decomposition, in MB; the less, the fewer parts at once, and then the
+    /// fewer components
     #[arg(long, default_value_t = 4000, value_parser = clap::value_parser!(u32).range(16..=1_000_000))]
     memory: u32,
     /// Tell what was reached, as JSON, to stdout
@@ -132,10 +135,19 @@ pub struct EncodeArgs {
 
 /// Four numbers in the ranges of chapter 12.
 fn parse_shape(text: &str) -> std::result::Result<[usize; 4], String> {
-    let numbers: Vec<usize> = text.split(',').map(|n| n.trim().parse().map_err(|_| format!("`{n}` is no number"))).collect::<std::result::Result<_, _>>()?;
-    let shape: [usize; 4] = numbers.try_into().map_err(|_| "four numbers: light atoms, ABRDF atoms, entries, coefficients".to_owned())?;
+    let numbers: Vec<usize> = text
+        .split(',')
+        .map(|n| n.trim().parse().map_err(|_| format!("`{n}` is no number")))
+        .collect::<std::result::Result<_, _>>()?;
+    let shape: [usize; 4] = numbers
+        .try_into()
+        .map_err(|_| "four numbers: light atoms, ABRDF atoms, entries, coefficients".to_owned())?;
     let most = [256, 1024, 32, 63];
-    if shape.iter().zip(most).all(|(n, most)| (1..=most).contains(n)) { Ok(shape) } else { Err(format!("1 to {most:?}")) }
+    if shape.iter().zip(most).all(|(n, most)| (1..=most).contains(n)) {
+        Ok(shape)
+    } else {
+        Err(format!("1 to {most:?}"))
+    }
 }
 
 /// A file that reached the goal.
@@ -191,7 +203,12 @@ impl Told {
         };
         format!(
             "{:?}, {:?}, {setting}: {} bytes, RMS log {:.4}, linear {:.5}, {} operations",
-            self.method, self.transfer, self.bytes, self.metrics.log_rms, self.metrics.linear_rms, self.operations
+            self.method,
+            self.transfer,
+            self.bytes,
+            self.metrics.log_rms,
+            self.metrics.linear_rms,
+            self.operations
         )
     }
 }
@@ -200,9 +217,15 @@ impl EncodeArgs {
     /// Refuses options that do not go together, before any data are read.
     fn check(&self) -> Result<()> {
         let usage = |text: &str| Err(ToolError::Usage(text.into()));
-        let of_ensemble = self.dictionary.is_some() || self.own_dictionaries.is_some() || self.edge.is_some() || self.coefficients.is_some();
-        if self.method != Method::SparseEnsemble && (of_ensemble || self.layers > 1 || self.offset.is_some()) {
-            return usage("--dictionary, --own-dictionaries, --edge, --coefficients, --layers and --offset are of --method sparse-ensemble");
+        let of_ensemble = self.dictionary.is_some()
+            || self.own_dictionaries.is_some()
+            || self.edge.is_some()
+            || self.coefficients.is_some();
+        if self.method != Method::SparseEnsemble && (of_ensemble || self.layers > 1 || self.offset.is_some())
+        {
+            return usage(
+                "--dictionary, --own-dictionaries, --edge, --coefficients, --layers and --offset are of --method sparse-ensemble",
+            );
         }
         if self.method == Method::SparseTensor && self.operations.is_some() {
             return usage("--operations is of --method sparse-ensemble and auto");
@@ -221,8 +244,13 @@ impl EncodeArgs {
             return usage("--offset: a normal number up to 1");
         }
         let goal = self.rmse.is_some() || self.psnr.is_some() || self.size.is_some();
-        if !goal && self.coefficients.is_none() && !(self.method == Method::SparseTensor && self.shape.is_some()) {
-            return usage("a goal is missing: --rmse, --psnr, --size, --coefficients of a sparse ensemble, or --shape of a sparse tensor alone");
+        if !goal
+            && self.coefficients.is_none()
+            && !(self.method == Method::SparseTensor && self.shape.is_some())
+        {
+            return usage(
+                "a goal is missing: --rmse, --psnr, --size, --coefficients of a sparse ensemble, or --shape of a sparse tensor alone",
+            );
         }
         Ok(())
     }
@@ -241,9 +269,15 @@ impl EncodeArgs {
     fn goal(&self, transfer: Domain, data: &Dataset) -> Result<tensor::Goal> {
         match (self.rmse, self.psnr, self.size) {
             (Some(rms), ..) if self.domain == transfer => Ok(tensor::Goal::Rms(rms)),
-            (Some(_), ..) => Err(ToolError::Usage("--rmse needs --domain and --transfer to be the same with --method sparse-tensor".into())),
-            (_, Some(db), _) if transfer == Domain::Linear => Ok(tensor::Goal::Rms(data.statistics().largest as f64 / 10f64.powf(db / 20.0))),
-            (_, Some(_), _) => Err(ToolError::Usage("--psnr needs --transfer linear with --method sparse-tensor".into())),
+            (Some(_), ..) => Err(ToolError::Usage(
+                "--rmse needs --domain and --transfer to be the same with --method sparse-tensor".into(),
+            )),
+            (_, Some(db), _) if transfer == Domain::Linear => {
+                Ok(tensor::Goal::Rms(data.statistics().largest as f64 / 10f64.powf(db / 20.0)))
+            }
+            (_, Some(_), _) => {
+                Err(ToolError::Usage("--psnr needs --transfer linear with --method sparse-tensor".into()))
+            }
             (_, _, Some(bytes)) => Ok(tensor::Goal::Size(bytes)),
             _ => Ok(tensor::Goal::All),
         }
@@ -259,7 +293,8 @@ pub fn encode(args: &EncodeArgs) -> Result<u8> {
     args.threads.apply();
     let data = Dataset::open(&args.dataset)?;
     let beside = files::folder_of(&args.output);
-    let temporary = tempfile::Builder::new().prefix(".selvedge-").tempdir_in(beside).map_err(ToolError::io(beside))?;
+    let temporary =
+        tempfile::Builder::new().prefix(".selvedge-").tempdir_in(beside).map_err(ToolError::io(beside))?;
     let progress = Progress::new();
     let coarser = pyramid::levels(&data, args.levels as usize, temporary.path())?;
     progress.tell("coarser levels", 1, 1);
@@ -290,7 +325,8 @@ pub fn encode(args: &EncodeArgs) -> Result<u8> {
     Ok(0)
 }
 
-/// Every method in the domains that are asked for; the best for the user's preference among those that reach the goal.
+/// Every method in the domains that are asked for; the best for the user's preference among those that reach
+/// the goal.
 fn choose(args: &EncodeArgs, data: &Dataset, coarser: &[Dataset], progress: &Progress) -> Result<Attempt> {
     let transfers = args.transfer.map_or(vec![Domain::Log, Domain::Linear], |one| vec![one]);
     let mut reached = Vec::new();
@@ -314,7 +350,8 @@ fn choose(args: &EncodeArgs, data: &Dataset, coarser: &[Dataset], progress: &Pro
             failed.push(format!("the fewest operations of those that do otherwise are {least}"));
         }
     }
-    let preference = args.prefer.unwrap_or(if args.size.is_some() { Preference::Error } else { Preference::Bytes });
+    let preference =
+        args.prefer.unwrap_or(if args.size.is_some() { Preference::Error } else { Preference::Bytes });
     let worth = |a: &Attempt| match preference {
         Preference::Bytes => a.told.bytes as f64,
         Preference::Operations => a.told.operations as f64,
@@ -330,11 +367,22 @@ fn choose(args: &EncodeArgs, data: &Dataset, coarser: &[Dataset], progress: &Pro
     Ok(best)
 }
 
-fn by_tensor(args: &EncodeArgs, data: &Dataset, coarser: &[Dataset], transfer: Domain, progress: &Progress) -> Result<Attempt> {
+fn by_tensor(
+    args: &EncodeArgs,
+    data: &Dataset,
+    coarser: &[Dataset],
+    transfer: Domain,
+    progress: &Progress,
+) -> Result<Attempt> {
     let goal = args.goal(transfer, data)?;
     let tell = |what: &str, done, all| progress.tell(what, done, all);
     tell("components", 0, 1);
-    let components = pca::pca_within(data, transfer.of_components(), args.rank as usize, args.memory as usize * 1_000_000)?;
+    let components = pca::pca_within(
+        data,
+        transfer.of_components(),
+        args.rank as usize,
+        args.memory as usize * 1_000_000,
+    )?;
     let training = tensor::fit::Training::default();
     let coarser: Vec<&Dataset> = coarser.iter().collect();
     let value_bits = args.value_bits.map(|bits| bits[0]);
@@ -344,7 +392,8 @@ fn by_tensor(args: &EncodeArgs, data: &Dataset, coarser: &[Dataset], transfer: D
             (shape, tensor::fit::fit(&components, shape, training, tell), None)
         }
         None => {
-            let (shape, fitted, encoded) = tensor::Trials::new(&components, training, tell).encode(&coarser, goal, value_bits, training, tell)?;
+            let (shape, fitted, encoded) = tensor::Trials::new(&components, training, tell)
+                .encode(&coarser, goal, value_bits, training, tell)?;
             (shape, fitted, Some(encoded))
         }
     };
@@ -355,16 +404,24 @@ fn by_tensor(args: &EncodeArgs, data: &Dataset, coarser: &[Dataset], transfer: D
     let (encoded, operations, metrics) = loop {
         let encoded = match first.take() {
             Some(encoded) => encoded,
-            None => tensor::encode_fit(&components, &fitted, &coarser, &tensor::Options { shape, goal, value_bits, training })?,
+            None => tensor::encode_fit(
+                &components,
+                &fitted,
+                &coarser,
+                &tensor::Options { shape, goal, value_bits, training },
+            )?,
         };
-        let (metrics, operations) = verify(data, &encoded.bytes, None, 1, &|done, all| tell("verifying", done, all))?;
+        let (metrics, operations) =
+            verify(data, &encoded.bytes, None, 1, &|done, all| tell("verifying", done, all))?;
         let found = if transfer == Domain::Log { metrics.log_rms } else { metrics.linear_rms };
         if found <= most {
             break (encoded, operations, metrics);
         }
         tries += 1;
         if tries == 4 {
-            return Err(ToolError::Usage(format!("a sparse tensor of this shape reaches {found:.6}, not {most}")));
+            return Err(ToolError::Usage(format!(
+                "a sparse tensor of this shape reaches {found:.6}, not {most}"
+            )));
         }
         if let tensor::Goal::Rms(rms) = &mut goal {
             *rms *= most / found * 0.998;
@@ -396,20 +453,37 @@ fn by_tensor(args: &EncodeArgs, data: &Dataset, coarser: &[Dataset], transfer: D
 }
 
 /// One file for each edge; an edge of zero lets the driver choose.
-fn by_ensemble(args: &EncodeArgs, data: &Dataset, coarser: &[Dataset], transfer: Domain, edges: &[usize], progress: &Progress) -> Result<Vec<Result<Attempt>>> {
+fn by_ensemble(
+    args: &EncodeArgs,
+    data: &Dataset,
+    coarser: &[Dataset],
+    transfer: Domain,
+    edges: &[usize],
+    progress: &Progress,
+) -> Result<Vec<Result<Attempt>>> {
     let model = match (transfer, args.offset) {
         (Domain::Log, Some(offset)) => TransferModel::Log2 { offset: offset as f32 },
         _ => tensor::transfer_of(data, transfer.of_components()),
     };
     let levels: Vec<&Dataset> = std::iter::once(data).chain(coarser).collect();
     let prepared = prepare(levels, model, &|done, all| progress.tell("means and bases", done, all))?;
-    let dictionary = args.dictionary.as_deref().map(|path| dictionary_file::from_bytes(path, files::read(path)?)).transpose()?;
+    let dictionary = args
+        .dictionary
+        .as_deref()
+        .map(|path| dictionary_file::from_bytes(path, files::read(path)?))
+        .transpose()?;
     if let Some(dictionary) = &dictionary {
         same_directions(dictionary, data.description())?;
     }
     let mut all = Vec::new();
     for &edge in edges {
-        let mut options = Options { edge, layers: args.layers as usize, operations: args.operations, value_bits: args.value_bits, ..Options::default() };
+        let mut options = Options {
+            edge,
+            layers: args.layers as usize,
+            operations: args.operations,
+            value_bits: args.value_bits,
+            ..Options::default()
+        };
         let mut trained = None;
         if let Some(count) = args.own_dictionaries {
             options.edge = if edge == 0 { 4 } else { edge };
@@ -472,7 +546,9 @@ fn own_dictionaries(data: &Dataset, count: usize, edge: usize) -> Result<Option<
 }
 
 fn same_directions(dictionary: &dictionary_file::DictionaryFile, description: &Description) -> Result<()> {
-    let near = |a: &[glam::DVec3], b: &[glam::DVec3]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (*a - *b).length() < 2e-4);
+    let near = |a: &[glam::DVec3], b: &[glam::DVec3]| {
+        a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (*a - *b).length() < 2e-4)
+    };
     let training = &dictionary.training;
     if near(&training.lights, &description.lights) && near(&training.views, &description.views) {
         return Ok(());

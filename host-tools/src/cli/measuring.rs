@@ -70,7 +70,10 @@ pub struct ReportArgs {
 }
 
 fn parse_ratio(text: &str) -> std::result::Result<f64, String> {
-    text.parse().ok().filter(|ratio: &f64| (1.0..=1e9).contains(ratio)).ok_or_else(|| "a ratio from 1 to 1e9".to_owned())
+    text.parse()
+        .ok()
+        .filter(|ratio: &f64| (1.0..=1e9).contains(ratio))
+        .ok_or_else(|| "a ratio from 1 to 1e9".to_owned())
 }
 
 /// What is told of a file.
@@ -120,12 +123,19 @@ fn bench(args: &BenchArgs) -> Result<u8> {
         return Ok(0);
     }
     let row = |name: &str, rate: &Rate| {
-        format!("  {name:24} {:9.3} M/s  ({:.3} to {:.3}; {:.3} of the reference)\n", rate.median / 1e6, rate.least / 1e6, rate.most / 1e6, rate.to_reference)
+        format!(
+            "  {name:24} {:9.3} M/s  ({:.3} to {:.3}; {:.3} of the reference)\n",
+            rate.median / 1e6,
+            rate.least / 1e6,
+            rate.most / 1e6,
+            rate.to_reference
+        )
     };
     let mut text = String::new();
     for m in &all {
         let s = &m.speed;
-        text += &format!("{}: {} bytes, opened in {:.3} ms\n", m.file.display(), m.bytes, m.open_seconds * 1e3);
+        text +=
+            &format!("{}: {} bytes, opened in {:.3} ms\n", m.file.display(), m.bytes, m.open_seconds * 1e3);
         text += &format!(
             "  operations a filtered sample: mean {:.0}, largest met {}, stated {}\n",
             m.operations.mean,
@@ -188,7 +198,8 @@ fn make_report(args: ReportArgs) -> Result<u8> {
 /// The page of stability; how many cases are broken.
 fn stability_page(out: &Path, say: &dyn Fn(&str)) -> Result<usize> {
     say("numerical stability");
-    let temporary = tempfile::Builder::new().prefix(".selvedge-").tempdir_in(out).map_err(ToolError::io(out))?;
+    let temporary =
+        tempfile::Builder::new().prefix(".selvedge-").tempdir_in(out).map_err(ToolError::io(out))?;
     let verdicts = stability::run(temporary.path(), |_, _| ());
     write_stability(&verdicts, out)?;
     let broken: Vec<_> = verdicts.iter().filter(|v| !v.holds()).collect();
@@ -199,5 +210,9 @@ fn stability_page(out: &Path, say: &dyn Fn(&str)) -> Result<usize> {
 }
 
 fn answer(broken: usize) -> Result<u8> {
-    if broken == 0 { Ok(0) } else { Err(ToolError::Mismatch(format!("{broken} cases of numerical stability exceed their bounds"))) }
+    if broken == 0 {
+        Ok(0)
+    } else {
+        Err(ToolError::Mismatch(format!("{broken} cases of numerical stability exceed their bounds")))
+    }
 }

@@ -17,7 +17,11 @@ use std::process::ExitCode;
 
 /// Compressed measured materials: import, check, decode.
 #[derive(Parser)]
-#[command(version, about, after_help = "Exit codes: 0 good, 1 bad usage, 2 I/O, 3 invalid file, 4 over limits, 5 unsupported.")]
+#[command(
+    version,
+    about,
+    after_help = "Exit codes: 0 good, 1 bad usage, 2 I/O, 3 invalid file, 4 over limits, 5 unsupported."
+)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -31,11 +35,13 @@ enum Command {
         #[arg(long)]
         out: PathBuf,
     },
-    /// Make a dataset of a .btf or of images in a folder or a zip; or a file of SparseBTF .bin files without encoding anew
+    /// Make a dataset of a .btf or of images in a folder or a zip; or a file of SparseBTF .bin files without
+    /// encoding anew
     Import {
-        /// What is imported, told apart by its content: a .btf of Bonn (UBO2014); a zip (UBO2003, ATRIUM) or a folder (UTIA) with
-        /// images named tlTTT plPPP tvTTT pvPPP (.exr, .png, .jpg, .hdr), or a folder with a dataset.json that lists them; or a
-        /// folder with Coeffs_BTF_NAME_1e-05_{Y,U,V}.bin, DictEnsOrth4D*.bin, NAME_mean_std.bin and xyz_loc.bin
+        /// What is imported, told apart by its content: a .btf of Bonn (UBO2014); a zip (UBO2003, ATRIUM) or
+        /// a folder (UTIA) with images named tlTTT plPPP tvTTT pvPPP (.exr, .png, .jpg, .hdr), or a
+        /// folder with a dataset.json that lists them; or a folder with
+        /// Coeffs_BTF_NAME_1e-05_{Y,U,V}.bin, DictEnsOrth4D*.bin, NAME_mean_std.bin and xyz_loc.bin
         source: PathBuf,
         /// SparseBTF: the material, if the folder has several
         #[arg(long)]
@@ -202,12 +208,14 @@ impl LimitArgs {
 }
 
 fn parse_blocks(text: &str) -> std::result::Result<[usize; 2], String> {
-    let parts: Option<Vec<usize>> = text.split('x').map(|n| n.parse().ok().filter(|n| (1..=1638).contains(n))).collect();
+    let parts: Option<Vec<usize>> =
+        text.split('x').map(|n| n.parse().ok().filter(|n| (1..=1638).contains(n))).collect();
     parts.and_then(|parts| parts.try_into().ok()).ok_or_else(|| "two numbers from 1 to 1638, as 40x30".into())
 }
 
 fn parse_angles(text: &str) -> std::result::Result<Direction, String> {
-    let parts: Option<Vec<f64>> = text.split(',').map(|n| n.trim().parse().ok().filter(|n: &f64| n.is_finite())).collect();
+    let parts: Option<Vec<f64>> =
+        text.split(',').map(|n| n.trim().parse().ok().filter(|n: &f64| n.is_finite())).collect();
     let Some(Ok([polar, azimuth])) = parts.map(<[f64; 2]>::try_from) else {
         return Err("two numbers, as 30,90".into());
     };
@@ -215,7 +223,11 @@ fn parse_angles(text: &str) -> std::result::Result<Direction, String> {
         return Err("the angle from the normal is 0 to 90 degrees".into());
     }
     let (polar, azimuth) = (polar.to_radians(), azimuth.to_radians());
-    Ok(Direction::from_unit_vector([(polar.sin() * azimuth.cos()) as f32, (polar.sin() * azimuth.sin()) as f32, polar.cos() as f32]))
+    Ok(Direction::from_unit_vector([
+        (polar.sin() * azimuth.cos()) as f32,
+        (polar.sin() * azimuth.sin()) as f32,
+        polar.cos() as f32,
+    ]))
 }
 
 fn parse_texel(text: &str) -> std::result::Result<[u32; 2], String> {
@@ -248,14 +260,27 @@ fn with_material<T>(source: &Source, use_it: impl FnOnce(selvedge::Selvedge<'_>)
     let dictionary = source.dictionary.as_deref().map(files::read).transpose()?;
     let opened = selvedge::open_with(&bytes, dictionary.as_deref(), &source.limits.limits());
     use_it(opened.map_err(|finding| match finding {
-        selvedge::Finding { rule: selvedge::Rule::Content, part: selvedge::Part::File, found: CONTENT_DICTIONARY, .. } => {
-            ToolError::Usage(format!("{} is a dictionary, which has no image: give a material", source.file.display()))
-        }
+        selvedge::Finding {
+            rule: selvedge::Rule::Content,
+            part: selvedge::Part::File,
+            found: CONTENT_DICTIONARY,
+            ..
+        } => ToolError::Usage(format!(
+            "{} is a dictionary, which has no image: give a material",
+            source.file.display()
+        )),
         finding => ToolError::Invalid { path: source.file.clone(), finding },
     })?)
 }
 
-fn import(folder: &Path, material: Option<String>, blocks: Option<[usize; 2]>, value_bits: u32, output: &Path, dictionary: Option<&Path>) -> Result<()> {
+fn import(
+    folder: &Path,
+    material: Option<String>,
+    blocks: Option<[usize; 2]>,
+    value_bits: u32,
+    output: &Path,
+    dictionary: Option<&Path>,
+) -> Result<()> {
     if dictionary.is_some_and(|dictionary| dictionary == output) {
         return Err(ToolError::Usage("--output and --dictionary must be two files".into()));
     }
@@ -263,7 +288,12 @@ fn import(folder: &Path, material: Option<String>, blocks: Option<[usize; 2]>, v
     let name = match (material, there.as_slice()) {
         (Some(name), there) if there.contains(&name) => name,
         (None, [only]) => only.clone(),
-        (_, []) => return Err(ToolError::Usage(format!("{}: no Coeffs_BTF_NAME_1e-05_{{Y,U,V}}.bin", folder.display()))),
+        (_, []) => {
+            return Err(ToolError::Usage(format!(
+                "{}: no Coeffs_BTF_NAME_1e-05_{{Y,U,V}}.bin",
+                folder.display()
+            )));
+        }
         (_, there) => return Err(ToolError::Usage(format!("--material says which: {}", there.join(", ")))),
     };
     let model = sparsebtf::read_material(folder, &name, blocks)?.to_model(value_bits)?;
@@ -277,7 +307,8 @@ fn import(folder: &Path, material: Option<String>, blocks: Option<[usize; 2]>, v
 
 /// Tells what a file, a dataset or data of others are.
 fn tell_info(source: &Source, json: bool) -> Result<u8> {
-    // Standard input holds a file of this format, and what is not to be known says so by its first broken rule.
+    // Standard input holds a file of this format, and what is not to be known says so by its first broken
+    // rule.
     let is_stream = source.file == Path::new("-");
     match if is_stream { Kind::Material } else { foreign::detect(&source.file)? } {
         Kind::Material | Kind::Dictionary => with_material(source, |material| {
@@ -302,7 +333,12 @@ fn tell_info(source: &Source, json: bool) -> Result<u8> {
 }
 
 /// Tells what is found in each file; the exit code is that of the first that is not good.
-fn check_files(paths: &[PathBuf], dictionary: Option<&Path>, options: &validate::Options, format: Format) -> Result<u8> {
+fn check_files(
+    paths: &[PathBuf],
+    dictionary: Option<&Path>,
+    options: &validate::Options,
+    format: Format,
+) -> Result<u8> {
     options.check()?;
     let dictionary = dictionary.map(files::read).transpose()?;
     let mut reports = Vec::new();
@@ -321,7 +357,11 @@ fn check_files(paths: &[PathBuf], dictionary: Option<&Path>, options: &validate:
     })?;
     match format {
         Format::Text => {}
-        Format::Json => print_json(&validate::Reports { format: "selvedge-validation-1", version: env!("CARGO_PKG_VERSION"), files: reports })?,
+        Format::Json => print_json(&validate::Reports {
+            format: "selvedge-validation-1",
+            version: env!("CARGO_PKG_VERSION"),
+            files: reports,
+        })?,
         Format::Sarif => print_json(&validate::sarif(&reports))?,
     }
     Ok(code)
@@ -329,8 +369,12 @@ fn check_files(paths: &[PathBuf], dictionary: Option<&Path>, options: &validate:
 
 /// Every rule and advice: number, name, usual severity, what it asks for.
 fn list_rules() -> Result<u8> {
-    let rules = selvedge::Rule::ALL.iter().map(|rule| format!("{}\t{}\terror\t{}\n", rule.id(), rule.name(), rule.title()));
-    let advice = validate::ADVICE.iter().map(|advice| format!("{}\t{}\twarning\t{}\n", advice.id, advice.name, advice.expected));
+    let rules = selvedge::Rule::ALL
+        .iter()
+        .map(|rule| format!("{}\t{}\terror\t{}\n", rule.id(), rule.name(), rule.title()));
+    let advice = validate::ADVICE
+        .iter()
+        .map(|advice| format!("{}\t{}\twarning\t{}\n", advice.id, advice.name, advice.expected));
     print(&rules.chain(advice).collect::<String>())?;
     Ok(0)
 }
@@ -341,7 +385,8 @@ fn conform(folder: &Path, make: bool, program: &[String]) -> Result<u8> {
         vectors::write(folder)?;
     }
     let suite = vectors::read(folder)?;
-    let found = if program.is_empty() { conform::run_own(&suite)? } else { conform::run_program(&suite, program)? };
+    let found =
+        if program.is_empty() { conform::run_own(&suite)? } else { conform::run_program(&suite, program)? };
     for d in &found {
         print(&format!("{}: {} is stated, {} was answered\n", d.path, d.stated, d.answered))?;
     }
@@ -354,34 +399,55 @@ fn run(cli: Cli) -> Result<u8> {
         Command::Demo { out } => demo::run(&out, &mut |line| eprintln!("{line}")).map(|()| 0),
         Command::Material(command) => commands::run(command),
         Command::Measuring(command) => measuring::run(command),
-        Command::Import { source, material, blocks, value_bits, output, dictionary, data } => match foreign::detect(&source)? {
-            Kind::SparseBtf => {
-                data.check_unused()?;
-                import(&source, material, blocks, value_bits.unwrap_or(demo::VALUE_BITS), &output, dictionary.as_deref()).map(|()| 0)
+        Command::Import { source, material, blocks, value_bits, output, dictionary, data } => {
+            match foreign::detect(&source)? {
+                Kind::SparseBtf => {
+                    data.check_unused()?;
+                    import(
+                        &source,
+                        material,
+                        blocks,
+                        value_bits.unwrap_or(demo::VALUE_BITS),
+                        &output,
+                        dictionary.as_deref(),
+                    )
+                    .map(|()| 0)
+                }
+                kind @ (Kind::Btf | Kind::Zip | Kind::Folder) => {
+                    let of_sparse = [
+                        ("--material", material.is_some()),
+                        ("--blocks", blocks.is_some()),
+                        ("--value-bits", value_bits.is_some()),
+                        ("--dictionary", dictionary.is_some()),
+                    ];
+                    of_sparse.into_iter().try_for_each(|(option, is_given)| {
+                        commands::check_applies(option, is_given, false, "folders of SparseBTF")
+                    })?;
+                    commands::import_data(&source, kind, &output, data).map(|()| 0)
+                }
+                kind => Err(ToolError::Usage(format!("{}: this is a {kind} already", source.display()))),
             }
-            kind @ (Kind::Btf | Kind::Zip | Kind::Folder) => {
-                let of_sparse = [
-                    ("--material", material.is_some()),
-                    ("--blocks", blocks.is_some()),
-                    ("--value-bits", value_bits.is_some()),
-                    ("--dictionary", dictionary.is_some()),
-                ];
-                of_sparse.into_iter().try_for_each(|(option, is_given)| commands::check_applies(option, is_given, false, "folders of SparseBTF"))?;
-                commands::import_data(&source, kind, &output, data).map(|()| 0)
-            }
-            kind => Err(ToolError::Usage(format!("{}: this is a {kind} already", source.display()))),
-        },
+        }
         Command::Info { source, json } => tell_info(&source, json),
         Command::Validate { rules: true, .. } => list_rules(),
         Command::Validate { schema: true, .. } => print(&validate::schema()).map(|()| 0),
-        Command::Validate { files, dictionary, limits, format, json, warnings_as_errors, severities, .. } => {
-            let options = validate::Options { limits: limits.limits(), warnings_as_errors, severities: severities.into_iter().collect() };
+        Command::Validate {
+            files, dictionary, limits, format, json, warnings_as_errors, severities, ..
+        } => {
+            let options = validate::Options {
+                limits: limits.limits(),
+                warnings_as_errors,
+                severities: severities.into_iter().collect(),
+            };
             check_files(&files, dictionary.as_deref(), &options, if json { Format::Json } else { format })
         }
         Command::Explain { source, texel, light, view, most, json } => with_material(&source, |material| {
             let size = material.image_size(0);
             if texel[0] >= size[0] || texel[1] >= size[1] {
-                return Err(ToolError::Usage(format!("--texel: the image has {} x {} texels", size[0], size[1])));
+                return Err(ToolError::Usage(format!(
+                    "--texel: the image has {} x {} texels",
+                    size[0], size[1]
+                )));
             }
             let explanation = explain::explain(&material, texel, light, view);
             if json {
@@ -392,24 +458,33 @@ fn run(cli: Cli) -> Result<u8> {
             Ok(0)
         }),
         Command::Conform { folder, make, program } => conform(&folder, make, &program),
-        Command::Decode { source, output, light, view, level, layers, exposure } => with_material(&source, |material| {
-            let header = material.header();
-            let most = [("--level", level, 0, header.level_count - 1), ("--layers", layers.unwrap_or(1), 1, header.layer_count)];
-            if let Some((name, _, low, high)) = most.iter().find(|(_, given, low, high)| !(low..=high).contains(&given)) {
-                return Err(ToolError::Usage(format!("{name}: this file has {low} to {high}")));
-            }
-            let material = layers.map_or(material, |layers| material.with_layers(layers));
-            let picture = show::decode_picture(&material, level, light, view)?;
-            let is_exr = output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("exr"));
-            let picture = if is_exr { picture } else { picture.exposed(exposure) };
-            picture.save(&output).map(|()| 0)
-        }),
+        Command::Decode { source, output, light, view, level, layers, exposure } => {
+            with_material(&source, |material| {
+                let header = material.header();
+                let most = [
+                    ("--level", level, 0, header.level_count - 1),
+                    ("--layers", layers.unwrap_or(1), 1, header.layer_count),
+                ];
+                if let Some((name, _, low, high)) =
+                    most.iter().find(|(_, given, low, high)| !(low..=high).contains(&given))
+                {
+                    return Err(ToolError::Usage(format!("{name}: this file has {low} to {high}")));
+                }
+                let material = layers.map_or(material, |layers| material.with_layers(layers));
+                let picture = show::decode_picture(&material, level, light, view)?;
+                let is_exr = output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("exr"));
+                let picture = if is_exr { picture } else { picture.exposed(exposure) };
+                picture.save(&output).map(|()| 0)
+            })
+        }
         Command::Kernel { out } => {
             match out {
                 Some(folder) => {
                     let translated = kernel::translate()?;
                     std::fs::create_dir_all(&folder).map_err(ToolError::io(&folder))?;
-                    translated.iter().try_for_each(|(name, bytes)| files::write(&folder.join(name), bytes))?;
+                    translated
+                        .iter()
+                        .try_for_each(|(name, bytes)| files::write(&folder.join(name), bytes))?;
                 }
                 None => print(&kernel::source())?,
             }
@@ -423,7 +498,9 @@ fn run(cli: Cli) -> Result<u8> {
 /// # Errors
 /// What is told of it.
 pub fn understands(arguments: &[String]) -> std::result::Result<(), String> {
-    Cli::try_parse_from(std::iter::once("selvedge").chain(arguments.iter().map(String::as_str))).map(drop).map_err(|error| error.to_string())
+    Cli::try_parse_from(std::iter::once("selvedge").chain(arguments.iter().map(String::as_str)))
+        .map(drop)
+        .map_err(|error| error.to_string())
 }
 
 /// The program.
@@ -439,7 +516,11 @@ pub fn main() -> ExitCode {
         Ok(code) => ExitCode::from(code),
         Err(error) => {
             // Names inside files of others may hold what a terminal would obey.
-            let words: String = error.to_string().chars().map(|c| if c != '\n' && selvedge::metadata::is_invisible(c) { '\u{fffd}' } else { c }).collect();
+            let words: String = error
+                .to_string()
+                .chars()
+                .map(|c| if c != '\n' && selvedge::metadata::is_invisible(c) { '\u{fffd}' } else { c })
+                .collect();
             eprintln!("selvedge: {words}");
             ExitCode::from(error.exit_code())
         }

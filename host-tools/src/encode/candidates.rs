@@ -1,6 +1,8 @@
-//! The pass over all blocks: project on every dictionary, keep the best, and of it the coefficients that may matter.
+//! The pass over all blocks: project on every dictionary, keep the best, and of it the coefficients that may
+//! matter.
 //!
-//! What is kept of a block is a short list, so that memory grows with what the file may hold and not with the data.
+//! What is kept of a block is a short list, so that memory grows with what the file may hold and not with the
+//! data.
 
 use crate::blocks::{self, Blocks};
 use crate::dictionary::{self, Ensemble};
@@ -34,7 +36,9 @@ pub struct Candidates {
 impl Candidates {
     /// The least square of each block.
     pub fn least_squares(&self) -> impl Iterator<Item = f64> + '_ {
-        let least = |range: &[usize]| self.values[range[0]..range[1]].iter().map(|&v| (v as f64).powi(2)).fold(f64::MAX, f64::min);
+        let least = |range: &[usize]| {
+            self.values[range[0]..range[1]].iter().map(|&v| (v as f64).powi(2)).fold(f64::MAX, f64::min)
+        };
         self.starts.windows(2).filter(|range| range[0] < range[1]).map(least)
     }
 }
@@ -50,8 +54,8 @@ struct Share {
 /// Buckets of magnitudes: exponent and seven bits of the mantissa.
 const BUCKETS: usize = 1 << 15;
 
-/// A magnitude that at least `count` of the numbers reach, less than 1 % below the largest such, and the energy of those
-/// above it.
+/// A magnitude that at least `count` of the numbers reach, less than 1 % below the largest such, and the
+/// energy of those above it.
 pub fn magnitude_of_rank(numbers: &[f32], count: usize, buckets: &mut Vec<u32>) -> (f32, f64) {
     buckets.clear();
     buckets.resize(BUCKETS, 0);
@@ -91,7 +95,13 @@ fn gain_above(numbers: &[f32], threshold: f32) -> f64 {
 }
 
 /// Projects blocks on the ensembles of the three channels, every `stride`-th of them.
-pub fn collect(blocks: &Blocks<'_>, ensembles: &[Ensemble; 3], keep: Keep, stride: usize, progress: &(dyn Fn(usize, usize) + Sync)) -> Result<[Candidates; 3]> {
+pub fn collect(
+    blocks: &Blocks<'_>,
+    ensembles: &[Ensemble; 3],
+    keep: Keep,
+    stride: usize,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<[Candidates; 3]> {
     let total = blocks.total().div_ceil(stride);
     // Small blocks go together, so that the products with the shared bases are large.
     let group = (64 / (blocks.edge * blocks.edge)).max(1);
@@ -139,8 +149,18 @@ pub fn collect(blocks: &Blocks<'_>, ensembles: &[Ensemble; 3], keep: Keep, strid
     })
 }
 
-fn share(dictionary: usize, tensor: &[f32], threshold: f32, keep: Keep, channel: usize, energy: f64) -> Share {
-    let above = (0u32..).zip(tensor).filter(|(_, value)| value.abs() >= threshold && **value != 0.0).map(|(place, &value)| (place, value));
+fn share(
+    dictionary: usize,
+    tensor: &[f32],
+    threshold: f32,
+    keep: Keep,
+    channel: usize,
+    energy: f64,
+) -> Share {
+    let above = (0u32..)
+        .zip(tensor)
+        .filter(|(_, value)| value.abs() >= threshold && **value != 0.0)
+        .map(|(place, &value)| (place, value));
     let mut list: Vec<(u32, f32)> = above.collect();
     if let Keep::Largest(counts) = keep
         && list.len() > counts[channel]
@@ -162,7 +182,8 @@ mod tests {
     #[test]
     fn ranks_and_gains_agree_with_sorting() {
         let mut random = Random::new(4);
-        let numbers: Vec<f32> = (0..5000).map(|_| (random.range(-1000, 1000) as f32 / 100.0).powi(3)).collect();
+        let numbers: Vec<f32> =
+            (0..5000).map(|_| (random.range(-1000, 1000) as f32 / 100.0).powi(3)).collect();
         let mut sorted: Vec<f32> = numbers.iter().map(|v| v.abs()).collect();
         sorted.sort_by(|a, b| b.total_cmp(a));
         for count in [1, 7, 100, 5000, 9000] {

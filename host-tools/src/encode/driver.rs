@@ -1,7 +1,8 @@
 //! The whole way from a dataset to a verified file: the edge chosen, the goal met by what the core decodes.
 //!
-//! [`super::encode`] predicts errors of the channels. This module decodes what it made, with the core, at every texel and
-//! pair of directions, and encodes again until the goal holds in the domain that was asked for.
+//! [`super::encode`] predicts errors of the channels. This module decodes what it made, with the core, at
+//! every texel and pair of directions, and encodes again until the goal holds in the domain that was asked
+//! for.
 
 use super::{Encoded, Goal, Options, Prepared, encode};
 use crate::dataset::Dataset;
@@ -51,8 +52,8 @@ pub enum Event<'a> {
     Attempt(usize, &'a Encoded, &'a Metrics),
 }
 
-/// Encodes until the wish holds. `edge` 0 chooses among [`EDGES`]: of the files at most 10 % worse than the best (in error for
-/// a size, in bytes for an error), that with the fewest operations.
+/// Encodes until the wish holds. `edge` 0 chooses among [`EDGES`]: of the files at most 10 % worse than the
+/// best (in error for a size, in bytes for an error), that with the fewest operations.
 ///
 /// # Errors
 /// As [`encode`]; and if the wish cannot be met.
@@ -84,7 +85,8 @@ pub fn encode_verified(
     };
     let best = tried.iter().map(worth).fold(f64::MAX, f64::min);
     let good = tried.into_iter().filter(|v| worth(v) <= best * ALLOWANCE);
-    good.min_by_key(|v| (v.operations, v.edge)).ok_or_else(|| failed.unwrap_or_else(|| ToolError::Usage("no edge of blocks meets the goal".into())))
+    good.min_by_key(|v| (v.operations, v.edge))
+        .ok_or_else(|| failed.unwrap_or_else(|| ToolError::Usage("no edge of blocks meets the goal".into())))
 }
 
 /// What a wish measures, smaller being better, and what it may be at most.
@@ -97,13 +99,22 @@ fn measured(wish: Wish, metrics: &Metrics) -> Option<(f64, f64)> {
     }
 }
 
-fn meet(prepared: &Prepared<'_>, ensembles: &[Ensemble; 3], wish: Wish, options: &Options, tell: &(dyn Fn(Event<'_>) + Sync)) -> Result<Verified> {
+fn meet(
+    prepared: &Prepared<'_>,
+    ensembles: &[Ensemble; 3],
+    wish: Wish,
+    options: &Options,
+    tell: &(dyn Fn(Event<'_>) + Sync),
+) -> Result<Verified> {
     let edge = options.edge;
     let verifying = |done, all| tell(Event::Pass("verifying", done, all));
     let attempt = |goal: Goal, sampled: bool| -> Result<(Verified, bool)> {
-        let encoded = encode(prepared, ensembles, &Options { goal, ..options.clone() }, &|done, all| tell(Event::Pass("projecting", done, all)))?;
+        let encoded = encode(prepared, ensembles, &Options { goal, ..options.clone() }, &|done, all| {
+            tell(Event::Pass("projecting", done, all))
+        })?;
         let every = if sampled { sampling(prepared, &encoded) } else { 1 };
-        let (metrics, operations) = verify(prepared.levels[0], &encoded.bytes, options.external.as_deref(), every, &verifying)?;
+        let (metrics, operations) =
+            verify(prepared.levels[0], &encoded.bytes, options.external.as_deref(), every, &verifying)?;
         tell(Event::Attempt(edge, &encoded, &metrics));
         Ok((Verified { encoded, edge, metrics, operations }, every > 1))
     };
@@ -114,7 +125,8 @@ fn meet(prepared: &Prepared<'_>, ensembles: &[Ensemble; 3], wish: Wish, options:
     }
     // In the domain of the channels the prediction is near; in the other the way goes by ratios.
     let log = matches!(prepared.forward.transfer, TransferModel::Log2 { .. });
-    let same_domain = matches!((wish, log), (Wish::LogRms(_), true) | (Wish::LinearRms(_) | Wish::Psnr(_), false));
+    let same_domain =
+        matches!((wish, log), (Wish::LogRms(_), true) | (Wish::LinearRms(_) | Wish::Psnr(_), false));
     let mut goal = match wish {
         // A little below, so that the first attempt is on the right side.
         Wish::LogRms(rms) | Wish::LinearRms(rms) if same_domain => rms * 0.997,
@@ -131,10 +143,17 @@ fn meet(prepared: &Prepared<'_>, ensembles: &[Ensemble; 3], wish: Wish, options:
     for _ in 0..8 {
         let (mut verified, sampled) = attempt(Goal::Rms(goal), true)?;
         let Some((mut found, most)) = measured(wish, &verified.metrics) else { return Ok(verified) };
-        let worth_it = best.as_ref().is_none_or(|best| verified.encoded.bytes.len() < best.encoded.bytes.len());
+        let worth_it =
+            best.as_ref().is_none_or(|best| verified.encoded.bytes.len() < best.encoded.bytes.len());
         // A sample can only refuse: what is kept was decoded as a whole.
         if sampled && found <= most && worth_it {
-            (verified.metrics, verified.operations) = verify(prepared.levels[0], &verified.encoded.bytes, options.external.as_deref(), 1, &verifying)?;
+            (verified.metrics, verified.operations) = verify(
+                prepared.levels[0],
+                &verified.encoded.bytes,
+                options.external.as_deref(),
+                1,
+                &verifying,
+            )?;
             found = measured(wish, &verified.metrics).map_or(found, |(found, _)| found);
         }
         let (reached, near) = (found <= most, found > most * 0.97);
@@ -168,16 +187,33 @@ fn sampling(prepared: &Prepared<'_>, encoded: &Encoded) -> usize {
 /// If it does.
 pub fn open_made<'a>(bytes: &'a [u8], dictionary: Option<&'a [u8]>) -> Result<Selvedge<'a>> {
     let opened = selvedge::open_with(bytes, dictionary, &Limits::NONE);
-    opened.map_err(|finding| ToolError::Mismatch(format!("the encoder wrote a file that breaks a rule: {finding}")))
+    opened.map_err(|finding| {
+        ToolError::Mismatch(format!("the encoder wrote a file that breaks a rule: {finding}"))
+    })
 }
 
-/// Decodes what an encoder made of some data, at every texel and every so many-th light: errors, and the operations that it states.
+/// Decodes what an encoder made of some data, at every texel and every so many-th light: errors, and the
+/// operations that it states.
 ///
 /// # Errors
 /// If it breaks a rule, or data cannot be read.
-pub fn verify(data: &Dataset, bytes: &[u8], dictionary: Option<&[u8]>, every: usize, progress: &dyn Fn(usize, usize)) -> Result<(Metrics, u32)> {
+pub fn verify(
+    data: &Dataset,
+    bytes: &[u8],
+    dictionary: Option<&[u8]>,
+    every: usize,
+    progress: &dyn Fn(usize, usize),
+) -> Result<(Metrics, u32)> {
     let file = open_made(bytes, dictionary)?;
     let (offset, peak) = (data.statistics().log_offset(), Some(data.statistics().largest as f64));
-    let metrics = compare_every(every, Source::Data(data), Source::File(&file, 0), data.description(), offset, peak, progress)?;
+    let metrics = compare_every(
+        every,
+        Source::Data(data),
+        Source::File(&file, 0),
+        data.description(),
+        offset,
+        peak,
+        progress,
+    )?;
     Ok((metrics, file.header().operations))
 }

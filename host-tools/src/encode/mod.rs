@@ -1,8 +1,9 @@
 //! The encoder of the sparse ensemble: a dataset becomes a file for a goal in error, bytes or coefficients.
 //!
-//! Two passes over the data: [`crate::blocks::moments`] gives means and bases, [`candidates::collect`] the coefficients
-//! that may matter. The goal is then met by one threshold over all blocks, channels and levels ([`select`]), since
-//! with orthonormal dictionaries and channels the square of a coefficient is the error of leaving it out.
+//! Two passes over the data: [`crate::blocks::moments`] gives means and bases, [`candidates::collect`] the
+//! coefficients that may matter. The goal is then met by one threshold over all blocks, channels and levels
+//! ([`select`]), since with orthonormal dictionaries and channels the square of a coefficient is the error of
+//! leaving it out.
 
 pub mod assemble;
 pub mod candidates;
@@ -30,7 +31,8 @@ use std::sync::Arc;
 pub enum Goal {
     /// Coefficients of a block in each channel.
     Coefficients([usize; 3]),
-    /// Root of the mean squared error in the domain of the channels: of `ln(x + offset)`, or of linear values.
+    /// Root of the mean squared error in the domain of the channels: of `ln(x + offset)`, or of linear
+    /// values.
     Rms(f64),
     /// Bytes of the whole file.
     Size(u64),
@@ -51,14 +53,21 @@ pub struct Options {
     pub layers: usize,
     /// Bits of a value in each channel; chosen by their worth if `None`.
     pub value_bits: Option<[u32; 3]>,
-    /// A dictionary file that the material shall name instead of carrying its columns. The ensembles are those that
-    /// were read from it, with their own spatial bases where the edge is another.
+    /// A dictionary file that the material shall name instead of carrying its columns. The ensembles are
+    /// those that were read from it, with their own spatial bases where the edge is another.
     pub external: Option<Arc<[u8]>>,
 }
 
 impl Default for Options {
     fn default() -> Options {
-        Options { edge: 4, goal: Goal::Rms(0.2), operations: None, layers: 1, value_bits: None, external: None }
+        Options {
+            edge: 4,
+            goal: Goal::Rms(0.2),
+            operations: None,
+            layers: 1,
+            value_bits: None,
+            external: None,
+        }
     }
 }
 
@@ -93,7 +102,11 @@ pub struct Prepared<'a> {
 }
 
 /// The first pass.
-pub fn prepare<'a>(levels: Vec<&'a Dataset>, transfer: TransferModel, progress: &dyn Fn(usize, usize)) -> Result<Prepared<'a>> {
+pub fn prepare<'a>(
+    levels: Vec<&'a Dataset>,
+    transfer: TransferModel,
+    progress: &dyn Fn(usize, usize),
+) -> Result<Prepared<'a>> {
     let forward = Forward::new(transfer);
     let moments = moments(levels[0], forward, progress)?;
     let (means, decoded_means) = mean_tables(&moments.means)?;
@@ -101,14 +114,19 @@ pub fn prepare<'a>(levels: Vec<&'a Dataset>, transfer: TransferModel, progress: 
 }
 
 impl Prepared<'_> {
-    /// The material's own bases: eigenvectors between lights and between views (HOSVD), cosines over texels; one
-    /// dictionary a channel.
+    /// The material's own bases: eigenvectors between lights and between views (HOSVD), cosines over texels;
+    /// one dictionary a channel.
     pub fn own_ensembles(&self, edge: usize) -> [Ensemble; 3] {
         std::array::from_fn(|c| {
             let description = self.levels[0].description();
             let (light, _) = eigenbasis(&self.moments.lights[c], description.lights.len());
             let (view, _) = eigenbasis(&self.moments.views[c], description.views.len());
-            Ensemble { light, view, turns: vec![Turn { light: None, view: None, x: Basis::cosine(edge), y: Basis::cosine(edge) }], tables: None }
+            Ensemble {
+                light,
+                view,
+                turns: vec![Turn { light: None, view: None, x: Basis::cosine(edge), y: Basis::cosine(edge) }],
+                tables: None,
+            }
         })
     }
 
@@ -137,32 +155,46 @@ impl Prepared<'_> {
 ///
 /// # Errors
 /// If the data cannot be read, or the goal is beyond what the format can hold.
-pub fn encode(prepared: &Prepared<'_>, ensembles: &[Ensemble; 3], options: &Options, progress: &(dyn Fn(usize, usize) + Sync)) -> Result<Encoded> {
+pub fn encode(
+    prepared: &Prepared<'_>,
+    ensembles: &[Ensemble; 3],
+    options: &Options,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Encoded> {
     let guess = match options.goal {
         Goal::Coefficients(counts) => {
             let candidates = collect_levels(prepared, ensembles, options, Keep::Largest(counts), progress)?;
             return Search::new(prepared, ensembles, options, &candidates).all();
         }
         Goal::Threshold(threshold) => {
-            let candidates = collect_levels(prepared, ensembles, options, Keep::Above(threshold as f32, threshold as f32), progress)?;
+            let candidates = collect_levels(
+                prepared,
+                ensembles,
+                options,
+                Keep::Above(threshold as f32, threshold as f32),
+                progress,
+            )?;
             return Search::new(prepared, ensembles, options, &candidates).at(threshold);
         }
         Goal::Rms(_) | Goal::Size(_) => guess_threshold(prepared, ensembles, options)?,
     };
     let mut least = guess * 0.6;
     loop {
-        let candidates = collect_levels(prepared, ensembles, options, Keep::Above(least as f32, guess as f32), progress)?;
+        let candidates =
+            collect_levels(prepared, ensembles, options, Keep::Above(least as f32, guess as f32), progress)?;
         let search = Search::new(prepared, ensembles, options, &candidates);
         let found = match options.goal {
             Goal::Size(bytes) => search.for_size(least, bytes)?,
             Goal::Rms(rms) => search.for_rms(least, rms)?,
             Goal::Coefficients(_) | Goal::Threshold(_) => None,
         };
-        // Nothing is found where even all that was kept leaves room: keep more, down to what is no information.
+        // Nothing is found where even all that was kept leaves room: keep more, down to what is no
+        // information.
         match found {
             Some(encoded) => return Ok(encoded),
             None if least < 1e-7 => return search.at(0.0),
-            // Where there is no room for atoms, what a lower threshold adds is little, and to look for it would not end.
+            // Where there is no room for atoms, what a lower threshold adds is little, and to look for it
+            // would not end.
             None if least < guess * 0.05 && search.has_no_room(least) => {
                 let why = "needs more atoms than a dictionary has room for: choose a smaller edge or more dictionaries";
                 return Err(ToolError::Usage(format!("this goal in blocks of {} {why}", options.edge)));
@@ -182,8 +214,15 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(prepared: &'a Prepared<'a>, ensembles: &'a [Ensemble; 3], options: &'a Options, candidates: &'a [[Candidates; 3]]) -> Search<'a> {
-        let channels = std::array::from_fn(|c| Channel::new(candidates.iter().map(|level| &level[c]).collect(), &ensembles[c]));
+    fn new(
+        prepared: &'a Prepared<'a>,
+        ensembles: &'a [Ensemble; 3],
+        options: &'a Options,
+        candidates: &'a [[Candidates; 3]],
+    ) -> Search<'a> {
+        let channels = std::array::from_fn(|c| {
+            Channel::new(candidates.iter().map(|level| &level[c]).collect(), &ensembles[c])
+        });
         Search { prepared, ensembles, options, candidates, channels }
     }
 
@@ -212,7 +251,10 @@ impl<'a> Search<'a> {
             return Ok(selections);
         }
         if cost(0.0) > cap as u64 {
-            return Err(ToolError::Usage(format!("{cap} operations are too few: without a coefficient a sample states {}", cost(0.0))));
+            return Err(ToolError::Usage(format!(
+                "{cap} operations are too few: without a coefficient a sample states {}",
+                cost(0.0)
+            )));
         }
         let (mut low, mut high) = (0.0, 1.0);
         for _ in 0..20 {
@@ -231,7 +273,14 @@ impl<'a> Search<'a> {
     }
 
     fn at(&self, threshold: f64) -> Result<Encoded> {
-        finish(self.prepared, self.ensembles, self.options, self.candidates, &self.select(threshold)?, threshold)
+        finish(
+            self.prepared,
+            self.ensembles,
+            self.options,
+            self.candidates,
+            &self.select(threshold)?,
+            threshold,
+        )
     }
 
     /// The largest file within `bytes`, or `None` if all candidates make a smaller one.
@@ -240,13 +289,18 @@ impl<'a> Search<'a> {
         if everything.bytes.len() as u64 <= bytes {
             return Ok(None);
         }
-        // Log of size over log of threshold is nearly straight, so a secant between the two sides finds the goal soon.
+        // Log of size over log of threshold is nearly straight, so a secant between the two sides finds the
+        // goal soon.
         let goal = (bytes as f64).ln();
         let (mut low, mut low_value) = (least.ln(), (everything.bytes.len() as f64).ln());
         let (mut high, mut high_value) = (low + 0.7, f64::NAN);
         let mut best: Option<Encoded> = None;
         for _ in 0..40 {
-            let next = if high_value.is_nan() { high } else { (low + (low_value - goal) / (low_value - high_value) * (high - low)).clamp(low, high) };
+            let next = if high_value.is_nan() {
+                high
+            } else {
+                (low + (low_value - goal) / (low_value - high_value) * (high - low)).clamp(low, high)
+            };
             let encoded = self.at(next.exp())?;
             let value = (encoded.bytes.len() as f64).ln();
             if value <= goal {
@@ -276,7 +330,11 @@ impl<'a> Search<'a> {
         let goal = (rms / self.prepared.unit()).powi(2) * self.prepared.values(self.options.edge);
         let lost = |threshold: f64| -> Result<f64> {
             if self.options.operations.is_none() {
-                let of: Vec<f64> = self.channels.par_iter().map(|channel| channel.lost_at_0(threshold as f32, COEFFICIENT_BITS)).collect();
+                let of: Vec<f64> = self
+                    .channels
+                    .par_iter()
+                    .map(|channel| channel.lost_at_0(threshold as f32, COEFFICIENT_BITS))
+                    .collect();
                 return Ok(of.iter().sum());
             }
             Ok(self.select(threshold)?.iter().map(|s| s.lost_at_0).sum())
@@ -295,7 +353,8 @@ impl<'a> Search<'a> {
                 if lost(middle.exp())? <= target { low = middle } else { high = middle }
             }
             let encoded = self.at(low.exp())?;
-            let total = (encoded.predicted_rms / self.prepared.unit()).powi(2) * self.prepared.values(self.options.edge);
+            let total = (encoded.predicted_rms / self.prepared.unit()).powi(2)
+                * self.prepared.values(self.options.edge);
             rounding = if encoded.lost > 0.0 { (total - encoded.lost) / encoded.lost } else { 0.0 };
             let (reached, near) = (total <= goal, (total - goal).abs() < 0.01 * goal);
             if reached {
@@ -322,7 +381,9 @@ fn collect_levels(
     keep: Keep,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Vec<[Candidates; 3]>> {
-    (0..prepared.levels.len()).map(|level| collect(&prepared.blocks(level, options.edge), ensembles, keep, 1, progress)).collect()
+    (0..prepared.levels.len())
+        .map(|level| collect(&prepared.blocks(level, options.edge), ensembles, keep, 1, progress))
+        .collect()
 }
 
 /// A threshold near the goal, from a few blocks.
@@ -354,7 +415,8 @@ fn guess_threshold(prepared: &Prepared<'_>, ensembles: &[Ensemble; 3], options: 
         }
         Goal::Coefficients(_) | Goal::Threshold(_) => 0,
     };
-    let square = if squares.is_empty() { 0.0 } else { squares[squares.len() - rank_from_top.clamp(1, squares.len())] };
+    let square =
+        if squares.is_empty() { 0.0 } else { squares[squares.len() - rank_from_top.clamp(1, squares.len())] };
     Ok((square as f64).sqrt().max(1e-6))
 }
 
@@ -370,7 +432,9 @@ fn finish(
     let (model, rounding) = assemble::material(&setting, ensembles, candidates, selections)?;
     let bytes = match &options.external {
         Some(dictionary) => {
-            let same_edge = ensembles.iter().all(|e| e.tables.as_ref().is_some_and(|t| t[0].x.entries.len() == options.edge * options.edge));
+            let same_edge = ensembles.iter().all(|e| {
+                e.tables.as_ref().is_some_and(|t| t[0].x.entries.len() == options.edge * options.edge)
+            });
             write_with_dictionary(&model, dictionary, !same_edge)
         }
         None => write_material(&model),

@@ -82,13 +82,18 @@ impl Archive {
     pub fn from_bytes(bytes: Bytes) -> Result<Archive> {
         let path = bytes.path().to_owned();
         let bad = |what: String| ToolError::Foreign { path: path.clone(), offset: 0, what };
-        let zip = zip::ZipArchive::new(Positioned { bytes: Arc::new(bytes), at: 0 }).map_err(|error| bad(error.to_string()))?;
+        let zip = zip::ZipArchive::new(Positioned { bytes: Arc::new(bytes), at: 0 })
+            .map_err(|error| bad(error.to_string()))?;
         if zip.len() > MOST_ENTRIES {
             return Err(bad(format!("{} entries; {MOST_ENTRIES} are possible", zip.len())));
         }
         let mut numbers = BTreeMap::new();
         for number in 0..zip.len() {
-            let name = zip.name_for_index(number).map(|name| name.map_err(|error| bad(error.to_string()))).transpose()?.unwrap_or_default();
+            let name = zip
+                .name_for_index(number)
+                .map(|name| name.map_err(|error| bad(error.to_string())))
+                .transpose()?
+                .unwrap_or_default();
             // Of entries of one name the archive's directory has the last.
             if !name.ends_with('/') {
                 numbers.insert(PathBuf::from(&*name), number);
@@ -134,7 +139,10 @@ impl Archive {
     pub fn find_shallow(&self, name: &str) -> Option<PathBuf> {
         match self {
             Archive::Folder(_) => Some(PathBuf::from(name)).filter(|path| self.has(path)),
-            Archive::Zip { numbers, .. } => numbers.keys().find(|path| path.ends_with(name) && path.components().count() <= 2 && !is_hidden(path)).cloned(),
+            Archive::Zip { numbers, .. } => numbers
+                .keys()
+                .find(|path| path.ends_with(name) && path.components().count() <= 2 && !is_hidden(path))
+                .cloned(),
         }
     }
 
@@ -161,7 +169,9 @@ impl Archive {
                 let file = zip.by_index(number).map_err(|error| bad(error.to_string()))?;
                 let mut bytes = Vec::new();
                 // What is stated may be wrong; what comes out counts.
-                file.take(memory as u64 + 1).read_to_end(&mut bytes).map_err(|error| bad(error.to_string()))?;
+                file.take(memory as u64 + 1)
+                    .read_to_end(&mut bytes)
+                    .map_err(|error| bad(error.to_string()))?;
                 if bytes.len() > memory {
                     return Err(bad(format!("more than {memory} bytes, which are allowed (--memory)")));
                 }
@@ -192,7 +202,10 @@ fn walk(folder: &Path, below: &Path, depth: usize, names: &mut Vec<PathBuf>) -> 
                 continue;
             }
             if depth == 0 {
-                return Err(ToolError::Usage(format!("{}: folders in folders, more than {DEPTH} deep", folder.join(name).display())));
+                return Err(ToolError::Usage(format!(
+                    "{}: folders in folders, more than {DEPTH} deep",
+                    folder.join(name).display()
+                )));
             }
             walk(folder, &name, depth - 1, names)?;
         } else if kind.is_file() {

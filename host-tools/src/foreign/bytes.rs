@@ -80,7 +80,10 @@ impl Bytes {
     /// That `length` bytes are there from an offset on.
     fn check(&self, offset: u64, length: u64, what: &str) -> Result<()> {
         if offset.checked_add(length).is_none_or(|end| end > self.length) {
-            return self.fail(self.length.min(offset), format!("{length} bytes of {what} begin at {offset}, but the file has {}", self.length));
+            return self.fail(
+                self.length.min(offset),
+                format!("{length} bytes of {what} begin at {offset}, but the file has {}", self.length),
+            );
         }
         Ok(())
     }
@@ -88,10 +91,13 @@ impl Bytes {
     /// `count` little-endian numbers from an offset on, all finite in binary32.
     ///
     /// # Errors
-    /// If the file ends before or a number is not finite, and on I/O. Nothing is held before the length is known to be there.
+    /// If the file ends before or a number is not finite, and on I/O. Nothing is held before the length is
+    /// known to be there.
     pub fn numbers(&self, offset: u64, count: u64, width: Width) -> Result<Vec<f32>> {
         let size = width as u64;
-        let Some(length) = count.checked_mul(size) else { return self.fail(offset, format!("{count} numbers of {size} bytes")) };
+        let Some(length) = count.checked_mul(size) else {
+            return self.fail(offset, format!("{count} numbers of {size} bytes"));
+        };
         self.check(offset, length, "numbers")?;
         let mut numbers = vec![0.0f32; count as usize];
         // By parts, so that the bytes are not held beside all the numbers.
@@ -102,9 +108,17 @@ impl Bytes {
             let bytes = &mut bytes[..out.len() * width as usize];
             self.read_at(at, bytes)?;
             match width {
-                Width::Half => out.iter_mut().zip(bytes.as_chunks().0).for_each(|(n, &b)| *n = half::f16::from_le_bytes(b).to_f32()),
-                Width::Single => out.iter_mut().zip(bytes.as_chunks().0).for_each(|(n, &b)| *n = f32::from_le_bytes(b)),
-                Width::Double => out.iter_mut().zip(bytes.as_chunks().0).for_each(|(n, &b)| *n = f64::from_le_bytes(b) as f32),
+                Width::Half => out
+                    .iter_mut()
+                    .zip(bytes.as_chunks().0)
+                    .for_each(|(n, &b)| *n = half::f16::from_le_bytes(b).to_f32()),
+                Width::Single => {
+                    out.iter_mut().zip(bytes.as_chunks().0).for_each(|(n, &b)| *n = f32::from_le_bytes(b))
+                }
+                Width::Double => out
+                    .iter_mut()
+                    .zip(bytes.as_chunks().0)
+                    .for_each(|(n, &b)| *n = f64::from_le_bytes(b) as f32),
             }
             if let Some(i) = out.iter().position(|n| !n.is_finite()) {
                 return self.fail(at + i as u64 * size, format!("the number {} is not finite", out[i]));

@@ -1,11 +1,14 @@
-//! Sets of images, one per pair of directions, into the dataset file and back: folders, and zip archives as UBO2003 and ATRIUM are published.
+//! Sets of images, one per pair of directions, into the dataset file and back: folders, and zip archives as
+//! UBO2003 and ATRIUM are published.
 //!
-//! Images are what [`super::pixels`] reads, in the folder, in folders below it, or in the archive. Row 0 of an image is the row y = 0 of texels.
+//! Images are what [`super::pixels`] reads, in the folder, in folders below it, or in the archive. Row 0 of
+//! an image is the row y = 0 of texels.
 //!
-//! The directions of an image stand in its name, which ends in `tl<n>pl<n>tv<n>pv<n>` before `.exr`, `.png`, `.jpg`, `.jpeg` or `.hdr`: polar and
-//! azimuth of the light, then of the view, in degrees; or in the view's and then the light's, `tv<n>pv<n>tl<n>pl<n>`. Any prefix may precede, anything
-//! but letters and digits may separate, case does not matter: `tl023.5_pl030_tv000_pv000.exr`, `00008 tl000 pl000 tv030 pv030.jpg`. Or the folder's
-//! `dataset.json` lists the images. All its fields may be left out; no others are allowed:
+//! The directions of an image stand in its name, which ends in `tl<n>pl<n>tv<n>pv<n>` before `.exr`, `.png`,
+//! `.jpg`, `.jpeg` or `.hdr`: polar and azimuth of the light, then of the view, in degrees; or in the view's
+//! and then the light's, `tv<n>pv<n>tl<n>pl<n>`. Any prefix may precede, anything but letters and digits may
+//! separate, case does not matter: `tl023.5_pl030_tv000_pv000.exr`, `00008 tl000 pl000 tv030 pv030.jpg`. Or
+//! the folder's `dataset.json` lists the images. All its fields may be left out; no others are allowed:
 //!
 //! ```json
 //! { "cosine_included": true, "texel_nm": [100000, 100000], "name": "", "origin": "", "licence": "",
@@ -13,12 +16,14 @@
 //!   "images": [{ "file": "a.exr", "light": [0, 0], "view": [0, 0] }] }
 //! ```
 //!
-//! With `images`, nothing else in the folder is looked at; without, every file with such an ending that is not hidden
-//! must have its angles. `lights` and `views` are unit vectors that the dataset shall have, in its order, and every
-//! direction of an image is one of them; an export writes them, so that its import has the same bits. Without them
-//! a set has the directions of the images sorted by polar angle and azimuth, or a known grid's, where they are one.
+//! With `images`, nothing else in the folder is looked at; without, every file with such an ending that is
+//! not hidden must have its angles. `lights` and `views` are unit vectors that the dataset shall have, in its
+//! order, and every direction of an image is one of them; an export writes them, so that its import has the
+//! same bits. Without them a set has the directions of the images sorted by polar angle and azimuth, or a
+//! known grid's, where they are one.
 //!
-//! Neither way holds the data: as many images as fit are turned from rows of texels into runs of pairs, or back.
+//! Neither way holds the data: as many images as fit are turned from rows of texels into runs of pairs, or
+//! back.
 
 use super::archive::Archive;
 use super::pixels::{self, to_srgb};
@@ -93,8 +98,8 @@ impl ImageSet {
     /// Reads names, directions and the size of the first image.
     ///
     /// # Errors
-    /// If the listing or a name is not as the module says; if a pair of directions is missing or there twice; if the first image cannot be
-    /// decoded; on I/O.
+    /// If the listing or a name is not as the module says; if a pair of directions is missing or there twice;
+    /// if the first image cannot be decoded; on I/O.
     pub fn open(path: &Path, memory: usize) -> Result<ImageSet> {
         ImageSet::of(Archive::open(path)?, memory)
     }
@@ -118,8 +123,10 @@ impl ImageSet {
         let entries = find(&archive, below, listing.images.take())?;
         let lights = set_of("light", path, listing.lights, entries.iter().map(|entry| entry.light))?;
         let views = set_of("view", path, listing.views, entries.iter().map(|entry| entry.view))?;
-        let names: Vec<PathBuf> = arrange(path, &entries, &lights, &views)?.into_iter().map(Path::to_owned).collect();
-        let first = pixels::open(archive.read(&names[0], memory)?, memory).map_err(|what| bad(&archive.describe(&names[0]), what))?;
+        let names: Vec<PathBuf> =
+            arrange(path, &entries, &lights, &views)?.into_iter().map(Path::to_owned).collect();
+        let first = pixels::open(archive.read(&names[0], memory)?, memory)
+            .map_err(|what| bad(&archive.describe(&names[0]), what))?;
         let description = Description {
             size: first.size,
             lights,
@@ -140,9 +147,14 @@ impl ImageSet {
     /// Makes a dataset; `progress` hears how many of how many images are done.
     ///
     /// # Errors
-    /// If an image is damaged, not of the first one's size, or has a number that is no radiance, with the file and the pixel; on I/O. There is no
-    /// dataset then.
-    pub fn import(&self, output: &Path, options: &ImportOptions, progress: &dyn Fn(usize, usize)) -> Result<Imported> {
+    /// If an image is damaged, not of the first one's size, or has a number that is no radiance, with the
+    /// file and the pixel; on I/O. There is no dataset then.
+    pub fn import(
+        &self,
+        output: &Path,
+        options: &ImportOptions,
+        progress: &dyn Fn(usize, usize),
+    ) -> Result<Imported> {
         let size = self.description.size;
         let writer = Writer::create(output, options.describe(&self.description))?;
         let (texels, pairs) = (size[0] * size[1], self.names.len());
@@ -152,9 +164,12 @@ impl ImageSet {
             let count = batch.min(pairs - first);
             let mut images = Vec::with_capacity(count);
             for wave in (first..first + count).step_by(WAVE) {
-                // All results are kept, so that the error is that of the first bad image, whichever thread was first.
-                let decoded: Vec<Result<(Vec<[f32; 3]>, u64)>> =
-                    (wave..(wave + WAVE).min(first + count)).into_par_iter().map(|pair| self.image(pair, options)).collect();
+                // All results are kept, so that the error is that of the first bad image, whichever thread
+                // was first.
+                let decoded: Vec<Result<(Vec<[f32; 3]>, u64)>> = (wave..(wave + WAVE).min(first + count))
+                    .into_par_iter()
+                    .map(|pair| self.image(pair, options))
+                    .collect();
                 for result in decoded {
                     let (image, cut) = result?;
                     negative += cut;
@@ -165,24 +180,35 @@ impl ImageSet {
             first += count;
             progress(first, pairs);
         }
-        let notes = if negative == 0 { Vec::new() } else { vec![format!("{negative} values were negative, as of colours outside of RGB; they are 0 now")] };
+        let notes = if negative == 0 {
+            Vec::new()
+        } else {
+            vec![format!("{negative} values were negative, as of colours outside of RGB; they are 0 now")]
+        };
         Ok(Imported { statistics: writer.finish()?, notes })
     }
 
     /// The linear pixels of a pair's image, row by row, and how many negative values became 0.
     ///
     /// # Errors
-    /// If it is damaged, not of the first one's size, or has a number that is no radiance, with the file and the pixel.
+    /// If it is damaged, not of the first one's size, or has a number that is no radiance, with the file and
+    /// the pixel.
     pub fn image(&self, pair: usize, options: &ImportOptions) -> Result<(Vec<[f32; 3]>, u64)> {
         let (size, name) = (self.description.size, &self.names[pair]);
         let path = || self.archive.describe(name);
         // As large as the first, and no more: many threads do this at once.
         let memory = (size[0] * size[1] * pixels::PIXEL_BYTES + SINGLE).min(options.memory.max(SINGLE));
-        let opened = pixels::open(self.archive.read(name, memory)?, memory).map_err(|what| bad(&path(), what))?;
+        let opened =
+            pixels::open(self.archive.read(name, memory)?, memory).map_err(|what| bad(&path(), what))?;
         if opened.size != size {
             let first = self.archive.describe(&self.names[0]);
             let [width, height] = opened.size;
-            let what = format!("{width} x {height} pixels, where the first image, {}, has {} x {}", first.display(), size[0], size[1]);
+            let what = format!(
+                "{width} x {height} pixels, where the first image, {}, has {} x {}",
+                first.display(),
+                size[0],
+                size[1]
+            );
             return Err(bad(&path(), what));
         }
         let mut pixels = opened.pixels(options.colours).map_err(|what| bad(&path(), what))?;
@@ -199,19 +225,32 @@ impl ImageSet {
     }
 }
 
-/// Makes a dataset of a folder or an archive of images; `progress` hears how many of how many images are done.
+/// Makes a dataset of a folder or an archive of images; `progress` hears how many of how many images are
+/// done.
 ///
 /// # Errors
 /// As [`ImageSet::open`] and [`ImageSet::import`].
-pub fn import(path: &Path, output: &Path, options: &ImportOptions, progress: &dyn Fn(usize, usize)) -> Result<Imported> {
+pub fn import(
+    path: &Path,
+    output: &Path,
+    options: &ImportOptions,
+    progress: &dyn Fn(usize, usize),
+) -> Result<Imported> {
     ImageSet::open(path, options.memory)?.import(output, options, progress)
 }
 
-/// Writes a dataset as a folder of images and a `dataset.json`, which comes last; returns how many values a PNG clamped.
+/// Writes a dataset as a folder of images and a `dataset.json`, which comes last; returns how many values a
+/// PNG clamped.
 ///
 /// # Errors
 /// If the folder has a `dataset.json` already, if two directions are closer than 0.01 degrees, and on I/O.
-pub fn export(dataset: &Dataset, folder: &Path, format: Format, memory: usize, progress: &dyn Fn(usize, usize)) -> Result<u64> {
+pub fn export(
+    dataset: &Dataset,
+    folder: &Path,
+    format: Format,
+    memory: usize,
+    progress: &dyn Fn(usize, usize),
+) -> Result<u64> {
     let description = dataset.description();
     let listing_path = folder.join(LISTING);
     std::fs::create_dir_all(folder).map_err(ToolError::io(folder))?;
@@ -219,14 +258,21 @@ pub fn export(dataset: &Dataset, folder: &Path, format: Format, memory: usize, p
         return Err(ToolError::Usage(format!("{}: there is a dataset already", listing_path.display())));
     }
     for (what, set) in [("light", &description.lights), ("view", &description.views)] {
-        if let Some(i) = (1..set.len()).find(|&i| set[..i].iter().any(|&other| degrees_between(other, set[i]) < SAME_DEGREES)) {
-            let what = format!("{what} direction {i} is within {SAME_DEGREES} degrees of an earlier one; an import would take them for the same");
+        if let Some(i) = (1..set.len())
+            .find(|&i| set[..i].iter().any(|&other| degrees_between(other, set[i]) < SAME_DEGREES))
+        {
+            let what = format!(
+                "{what} direction {i} is within {SAME_DEGREES} degrees of an earlier one; an import would take them for the same"
+            );
             return Err(bad(dataset.path(), what));
         }
     }
     let ending = if format == Format::Exr { "exr" } else { "png" };
     let entry = |pair: usize| {
-        let ends = [description.lights[pair % description.lights.len()], description.views[pair / description.lights.len()]];
+        let ends = [
+            description.lights[pair % description.lights.len()],
+            description.views[pair / description.lights.len()],
+        ];
         let [light, view] = ends.map(|d| to_degrees(d).map(|angle| (angle * 1e6).round() / 1e6));
         let [[tl, pl], [tv, pv]] = [light, view].map(|angles| angles.map(in_name));
         Entry { file: format!("tl{tl}_pl{pl}_tv{tv}_pv{pv}.{ending}").into(), light, view }
@@ -244,8 +290,14 @@ pub fn export(dataset: &Dataset, folder: &Path, format: Format, memory: usize, p
                 let path = folder.join(entry(first + i).file);
                 let number = |texel: usize, c: usize| values[(texel * count + i) * 3 + c];
                 let (bytes, clamped) = match format {
-                    Format::Exr => (to_exr(description.size, description.sample, number).map_err(|error| bad(&path, error.to_string()))?, 0),
-                    Format::Png => to_png(description.size, number).map_err(|error| bad(&path, error.to_string()))?,
+                    Format::Exr => (
+                        to_exr(description.size, description.sample, number)
+                            .map_err(|error| bad(&path, error.to_string()))?,
+                        0,
+                    ),
+                    Format::Png => {
+                        to_png(description.size, number).map_err(|error| bad(&path, error.to_string()))?
+                    }
                 };
                 files::write(&path, &bytes).map(|()| clamped)
             })
@@ -287,7 +339,10 @@ fn find(archive: &Archive, below: &Path, listed: Option<Vec<Entry>>) -> Result<V
         for mut entry in listed {
             // A listing from elsewhere reads nothing outside its folder.
             if entry.file.components().any(|part| !matches!(part, Component::Normal(_))) {
-                return Err(bad(&archive.describe(Path::new(LISTING)), format!("{}: not a path inside the folder", entry.file.display())));
+                return Err(bad(
+                    &archive.describe(Path::new(LISTING)),
+                    format!("{}: not a path inside the folder", entry.file.display()),
+                ));
             }
             entry.file = below.join(&entry.file);
             // Before hours of reading the others.
@@ -300,7 +355,12 @@ fn find(archive: &Archive, below: &Path, listed: Option<Vec<Entry>>) -> Result<V
         for file in archive.names()?.into_iter().filter(|name| is_image(name)) {
             let stem = file.file_stem().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
             let Some([light, view]) = angles_of(&stem) else {
-                return Err(bad(&archive.describe(&file), format!("the name does not end in tl<n>pl<n>tv<n>pv<n>, and no {LISTING} lists the images")));
+                return Err(bad(
+                    &archive.describe(&file),
+                    format!(
+                        "the name does not end in tl<n>pl<n>tv<n>pv<n>, and no {LISTING} lists the images"
+                    ),
+                ));
             };
             entries.push(Entry { file, light, view });
         }
@@ -309,24 +369,34 @@ fn find(archive: &Archive, below: &Path, listed: Option<Vec<Entry>>) -> Result<V
         for (what, angles) in [("light", &mut entry.light), ("view", &mut entry.view)] {
             let [polar, azimuth] = *angles;
             if !(0.0..=90.0).contains(&polar) || !azimuth.is_finite() {
-                return Err(bad(&archive.describe(&entry.file), format!("{what} at ({polar}, {azimuth}) degrees; the polar angle is from 0 to 90")));
+                return Err(bad(
+                    &archive.describe(&entry.file),
+                    format!("{what} at ({polar}, {azimuth}) degrees; the polar angle is from 0 to 90"),
+                ));
             }
             // A remainder of minus a trifle rounds to 360.
             let turned = azimuth.rem_euclid(360.0);
             // At the normal every azimuth is the same, and minus zero is zero.
-            *angles = if polar < 1e-9 { [0.0; 2] } else { [polar, if turned >= 360.0 { 0.0 } else { turned }] };
+            *angles =
+                if polar < 1e-9 { [0.0; 2] } else { [polar, if turned >= 360.0 { 0.0 } else { turned }] };
         }
     }
-    if entries.is_empty() { Err(bad(archive.path(), "there are no images: no EXR, PNG, JPEG or Radiance pictures")) } else { Ok(entries) }
+    if entries.is_empty() {
+        Err(bad(archive.path(), "there are no images: no EXR, PNG, JPEG or Radiance pictures"))
+    } else {
+        Ok(entries)
+    }
 }
 
-/// The angles that a stem ends in, light before view or view before light, from the first tag after which all is as it should be.
+/// The angles that a stem ends in, light before view or view before light, from the first tag after which all
+/// is as it should be.
 fn angles_of(stem: &str) -> Option<[[f64; 2]; 2]> {
     let after = |tags: [&str; 4]| {
         stem.match_indices(tags[0]).find_map(|(at, _)| {
             let mut rest = &stem[at..];
             let mut next = |tag: &str| {
-                let after = rest.trim_start_matches(|c: char| !c.is_ascii_alphanumeric()).strip_prefix(tag)?;
+                let after =
+                    rest.trim_start_matches(|c: char| !c.is_ascii_alphanumeric()).strip_prefix(tag)?;
                 let digits = |text: &str| text.bytes().take_while(u8::is_ascii_digit).count();
                 let sign = usize::from(after.starts_with('-'));
                 let whole = sign + digits(&after[sign..]);
@@ -340,7 +410,8 @@ fn angles_of(stem: &str) -> Option<[[f64; 2]; 2]> {
             rest.is_empty().then_some(angles)
         })
     };
-    after(["tl", "pl", "tv", "pv"]).or_else(|| after(["tv", "pv", "tl", "pl"]).map(|[view, light]| [light, view]))
+    after(["tl", "pl", "tv", "pv"])
+        .or_else(|| after(["tv", "pv", "tl", "pl"]).map(|[view, light]| [light, view]))
 }
 
 /// An angle in a name: three digits, and up to three decimals.
@@ -357,7 +428,12 @@ pub(super) fn degrees_between(a: DVec3, b: DVec3) -> f64 {
 }
 
 /// The set of directions: the listed one, or the images' own, sorted, or the known grid that they are.
-fn set_of(what: &str, folder: &Path, listed: Vec<DVec3>, angles: impl Iterator<Item = [f64; 2]>) -> Result<Vec<DVec3>> {
+fn set_of(
+    what: &str,
+    folder: &Path,
+    listed: Vec<DVec3>,
+    angles: impl Iterator<Item = [f64; 2]>,
+) -> Result<Vec<DVec3>> {
     let too_many = || bad(folder, format!("more than {MOST_DIRECTIONS} {what} directions"));
     if !listed.is_empty() {
         return if listed.len() > MOST_DIRECTIONS { Err(too_many()) } else { Ok(listed) };
@@ -375,37 +451,64 @@ fn set_of(what: &str, folder: &Path, listed: Vec<DVec3>, angles: impl Iterator<I
             set.push(direction);
         }
     }
-    let is_grid = |grid: &Vec<DVec3>| grid.iter().all(|&g| set.iter().filter(|&&d| degrees_between(d, g) < SAME_DEGREES).count() == 1);
+    let is_grid = |grid: &Vec<DVec3>| {
+        grid.iter().all(|&g| set.iter().filter(|&&d| degrees_between(d, g) < SAME_DEGREES).count() == 1)
+    };
     Ok(grid(set.len()).filter(is_grid).unwrap_or(set))
 }
 
 /// The file of every pair in the dataset's order.
-fn arrange<'a>(folder: &Path, entries: &'a [Entry], lights: &[DVec3], views: &[DVec3]) -> Result<Vec<&'a Path>> {
+fn arrange<'a>(
+    folder: &Path,
+    entries: &'a [Entry],
+    lights: &[DVec3],
+    views: &[DVec3],
+) -> Result<Vec<&'a Path>> {
     let nearest = |set: &[DVec3], [polar, azimuth]: [f64; 2]| {
         let asked = from_degrees(polar, azimuth);
         let distances = set.iter().map(|&other| degrees_between(other, asked)).enumerate();
-        // An image's direction may be this far from the one that stands for it, and that one as far from a grid's.
-        distances.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|&(_, distance)| distance <= 2.0 * SAME_DEGREES).map(|(i, _)| i)
+        // An image's direction may be this far from the one that stands for it, and that one as far from a
+        // grid's.
+        distances
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .filter(|&(_, distance)| distance <= 2.0 * SAME_DEGREES)
+            .map(|(i, _)| i)
     };
     // The same angles come in thousands of names.
     let mut known: [HashMap<[u64; 2], Option<usize>>; 2] = Default::default();
     let mut find = |entry: &Entry, side: usize| {
-        let (what, set, angles) = if side == 0 { ("light", lights, entry.light) } else { ("view", views, entry.view) };
+        let (what, set, angles) =
+            if side == 0 { ("light", lights, entry.light) } else { ("view", views, entry.view) };
         let index = *known[side].entry(angles.map(f64::to_bits)).or_insert_with(|| nearest(set, angles));
-        index.ok_or_else(|| bad(&folder.join(&entry.file), format!("{what} at ({}, {}) degrees is none of those that {LISTING} has", angles[0], angles[1])))
+        index.ok_or_else(|| {
+            bad(
+                &folder.join(&entry.file),
+                format!(
+                    "{what} at ({}, {}) degrees is none of those that {LISTING} has",
+                    angles[0], angles[1]
+                ),
+            )
+        })
     };
     let mut files: Vec<Option<&Path>> = vec![None; lights.len() * views.len()];
     for entry in entries {
         let light = find(entry, 0)?;
         let view = find(entry, 1)?;
         if let Some(other) = files[view * lights.len() + light].replace(&entry.file) {
-            return Err(bad(&folder.join(&entry.file), format!("the same pair of directions as {}", other.display())));
+            return Err(bad(
+                &folder.join(&entry.file),
+                format!("the same pair of directions as {}", other.display()),
+            ));
         }
     }
     if let Some(pair) = files.iter().position(Option::is_none) {
         let missing = files.iter().filter(|file| file.is_none()).count();
-        let [[tl, pl], [tv, pv]] = [lights[pair % lights.len()], views[pair / lights.len()]].map(|d| to_degrees(d).map(in_name));
-        let what = format!("{missing} of {} pairs of directions are missing, the first of them tl{tl}_pl{pl}_tv{tv}_pv{pv}", files.len());
+        let [[tl, pl], [tv, pv]] =
+            [lights[pair % lights.len()], views[pair / lights.len()]].map(|d| to_degrees(d).map(in_name));
+        let what = format!(
+            "{missing} of {} pairs of directions are missing, the first of them tl{tl}_pl{pl}_tv{tv}_pv{pv}",
+            files.len()
+        );
         return Err(bad(folder, what));
     }
     Ok(files.into_iter().flatten().collect())
@@ -417,7 +520,10 @@ fn to_srgb16(linear: f32) -> u16 {
 }
 
 /// Bytes of a PNG, and how many values were clamped; `number` is of a texel and a colour.
-fn to_png([width, height]: [usize; 2], number: impl Fn(usize, usize) -> f32) -> std::result::Result<(Vec<u8>, u64), png::EncodingError> {
+fn to_png(
+    [width, height]: [usize; 2],
+    number: impl Fn(usize, usize) -> f32,
+) -> std::result::Result<(Vec<u8>, u64), png::EncodingError> {
     let mut clamped = 0;
     let mut data = Vec::with_capacity(width * height * 6);
     for i in 0..width * height * 3 {
@@ -437,14 +543,24 @@ fn to_png([width, height]: [usize; 2], number: impl Fn(usize, usize) -> f32) -> 
 }
 
 /// Bytes of an EXR of the dataset's own numbers.
-fn to_exr(size: [usize; 2], sample: Sample, number: impl Fn(usize, usize) -> f32 + Sync) -> exr::error::Result<Vec<u8>> {
-    fn rgb<T: IntoSample>([width, height]: [usize; 2], number: impl Fn(usize, usize) -> T + Sync) -> exr::error::Result<Vec<u8>> {
+fn to_exr(
+    size: [usize; 2],
+    sample: Sample,
+    number: impl Fn(usize, usize) -> f32 + Sync,
+) -> exr::error::Result<Vec<u8>> {
+    fn rgb<T: IntoSample>(
+        [width, height]: [usize; 2],
+        number: impl Fn(usize, usize) -> T + Sync,
+    ) -> exr::error::Result<Vec<u8>> {
         let pixel = |at: Vec2<usize>| {
             let texel = at.y() * width + at.x();
             (number(texel, 0), number(texel, 1), number(texel, 2))
         };
         let mut bytes = std::io::Cursor::new(Vec::new());
-        Image::from_channels((width, height), SpecificChannels::rgb(pixel)).write().non_parallel().to_buffered(&mut bytes)?;
+        Image::from_channels((width, height), SpecificChannels::rgb(pixel))
+            .write()
+            .non_parallel()
+            .to_buffered(&mut bytes)?;
         Ok(bytes.into_inner())
     }
     match sample {
@@ -480,7 +596,8 @@ mod tests {
 
     /// Lights and views that differ, of no grid, out of order, with angles that no decimals write.
     fn odd(sample: Sample, size: [usize; 2]) -> Description {
-        let lights = vec![from_degrees(23.5, 359.9), from_degrees(0.0, 0.0), from_degrees(61.234_567_891, 30.1)];
+        let lights =
+            vec![from_degrees(23.5, 359.9), from_degrees(0.0, 0.0), from_degrees(61.234_567_891, 30.1)];
         let views = vec![DVec3::new(0.3, -0.2, 0.9).normalize(), from_degrees(0.1, 200.0)];
         let texts = ["Linen".into(), "measured".into(), "CC0".into()];
         Description { size, lights, views, sample, cosine_included: true, texel_nm: [70_000, 80_000], texts }
@@ -491,21 +608,53 @@ mod tests {
         let place = tempfile::tempdir().expect("a folder");
         for sample in [Sample::Half, Sample::Float] {
             let grid = grid(81).expect("known");
-            let some = Description { size: [3, 2], lights: grid[..9].to_vec(), views: grid[20..25].to_vec(), sample, ..Description::default() };
-            let all = Description { size: [1, 1], views: grid.clone(), lights: grid[..1].to_vec(), sample, ..Description::default() };
-            let single = Description { size: [4, 4], lights: grid[..1].to_vec(), views: grid[3..4].to_vec(), sample, ..Description::default() };
+            let some = Description {
+                size: [3, 2],
+                lights: grid[..9].to_vec(),
+                views: grid[20..25].to_vec(),
+                sample,
+                ..Description::default()
+            };
+            let all = Description {
+                size: [1, 1],
+                views: grid.clone(),
+                lights: grid[..1].to_vec(),
+                sample,
+                ..Description::default()
+            };
+            let single = Description {
+                size: [4, 4],
+                lights: grid[..1].to_vec(),
+                views: grid[3..4].to_vec(),
+                sample,
+                ..Description::default()
+            };
             for (i, description) in [odd(sample, [5, 3]), some, all, single].into_iter().enumerate() {
                 for black in [false, true] {
                     // One image at a time, some, and all.
                     for memory in [0, 1000, 1 << 20] {
-                        let name = |what: &str| place.path().join(format!("{what}-{sample:?}-{i}-{black}-{memory}"));
+                        let name =
+                            |what: &str| place.path().join(format!("{what}-{sample:?}-{i}-{black}-{memory}"));
                         let value = |n: usize| if black { 0.0 } else { (n % 1999) as f32 * 0.37 };
                         let half = |n: usize| f16::from_f32(value(n)).to_f32();
                         let dataset = write_dataset(&name("a"), description.clone(), half);
-                        assert_eq!(export(&dataset, &name("f"), Format::Exr, memory, QUIET).expect("exported"), 0);
-                        let statistics = import(&name("f"), &name("b"), &ImportOptions { memory, ..options(sample) }, QUIET).expect("imported");
+                        assert_eq!(
+                            export(&dataset, &name("f"), Format::Exr, memory, QUIET).expect("exported"),
+                            0
+                        );
+                        let statistics = import(
+                            &name("f"),
+                            &name("b"),
+                            &ImportOptions { memory, ..options(sample) },
+                            QUIET,
+                        )
+                        .expect("imported");
                         assert_eq!(&statistics.statistics, dataset.statistics());
-                        assert!(fs::read(name("a")).expect("read") == fs::read(name("b")).expect("read"), "{:?}", name("b"));
+                        assert!(
+                            fs::read(name("a")).expect("read") == fs::read(name("b")).expect("read"),
+                            "{:?}",
+                            name("b")
+                        );
                     }
                 }
             }
@@ -553,10 +702,19 @@ mod tests {
         let dataset = Dataset::open(&output).expect("opened");
         assert_eq!(dataset.description().views, [DVec3::Z]);
         assert_eq!(dataset.description().lights, known);
-        assert!((0..81).all(|i| dataset.image(i, 0).expect("read") == [[i as f32 * 2.0; 3], [i as f32 * 2.0 + 1.0; 3]]));
-        assert_eq!(dataset.description().lights[0].to_array().map(f64::to_bits), DVec3::Z.to_array().map(f64::to_bits));
+        assert!(
+            (0..81)
+                .all(|i| dataset.image(i, 0).expect("read")
+                    == [[i as f32 * 2.0; 3], [i as f32 * 2.0 + 1.0; 3]])
+        );
+        assert_eq!(
+            dataset.description().lights[0].to_array().map(f64::to_bits),
+            DVec3::Z.to_array().map(f64::to_bits)
+        );
         assert_eq!(angles_of("x-tl023.5_pl030_tv000_pv007.25"), Some([[23.5, 30.0], [0.0, 7.25]]));
-        for none in ["", "tl1", "tl1pl2tv3pv", "tl1pl2tv3pv4b", "tl1xpl2tv3pv4", "tl1pl2pv4tv3", "tl--1pl2tv3pv4"] {
+        for none in
+            ["", "tl1", "tl1pl2tv3pv", "tl1pl2tv3pv4b", "tl1xpl2tv3pv4", "tl1pl2pv4tv3", "tl--1pl2tv3pv4"]
+        {
             assert_eq!(angles_of(none), None, "{none}");
         }
     }
@@ -574,16 +732,36 @@ mod tests {
             decode(&path)
         };
         let grey = from_srgb16(257 * 100);
-        assert_eq!(write(png::ColorType::Grayscale, png::BitDepth::Eight, &[100]).expect("read"), [[grey; 3]]);
-        assert_eq!(write(png::ColorType::GrayscaleAlpha, png::BitDepth::Sixteen, &[100, 100, 0, 0]).expect("read"), [[grey; 3]]);
-        assert_eq!(write(png::ColorType::Rgba, png::BitDepth::Eight, &[255, 0, 100, 7]).expect("read"), [[1.0, 0.0, grey]]);
-        assert!(write(png::ColorType::Indexed, png::BitDepth::Eight, &[1]).expect_err("refused").to_string().contains("Indexed"));
+        assert_eq!(
+            write(png::ColorType::Grayscale, png::BitDepth::Eight, &[100]).expect("read"),
+            [[grey; 3]]
+        );
+        assert_eq!(
+            write(png::ColorType::GrayscaleAlpha, png::BitDepth::Sixteen, &[100, 100, 0, 0]).expect("read"),
+            [[grey; 3]]
+        );
+        assert_eq!(
+            write(png::ColorType::Rgba, png::BitDepth::Eight, &[255, 0, 100, 7]).expect("read"),
+            [[1.0, 0.0, grey]]
+        );
+        assert!(
+            write(png::ColorType::Indexed, png::BitDepth::Eight, &[1])
+                .expect_err("refused")
+                .to_string()
+                .contains("Indexed")
+        );
         let path = place.path().join("grey.exr");
-        let channels = SpecificChannels::build().with_channel::<f32>("Y").with_channel::<f32>("Z").with_pixel_fn(|_| (0.25, -1.0));
+        let channels = SpecificChannels::build()
+            .with_channel::<f32>("Y")
+            .with_channel::<f32>("Z")
+            .with_pixel_fn(|_| (0.25, -1.0));
         Image::from_channels((2, 1), channels).write().to_file(&path).expect("written");
         assert_eq!(decode(&path).expect("read"), [[0.25; 3]; 2]);
         // Elsewhere on the canvas, and written from the last row on.
-        let encoding = exr::image::Encoding { line_order: exr::meta::attribute::LineOrder::Decreasing, ..exr::image::Encoding::UNCOMPRESSED };
+        let encoding = exr::image::Encoding {
+            line_order: exr::meta::attribute::LineOrder::Decreasing,
+            ..exr::image::Encoding::UNCOMPRESSED
+        };
         let attributes = exr::meta::header::LayerAttributes::named("a").with_position(Vec2(5, -3));
         let channels = SpecificChannels::rgb(|at: Vec2<usize>| (at.x() as f32, at.y() as f32, 0.0f32));
         let layer = exr::image::Layer::new((2, 3), attributes, encoding, channels);
@@ -605,7 +783,8 @@ mod tests {
         import(place.path(), &output, &options(Sample::Half), QUIET).expect("good as it is");
         fs::remove_file(&output).expect("removed");
         spoil(place.path());
-        let said = import(place.path(), &output, &options(Sample::Half), QUIET).expect_err("refused").to_string();
+        let said =
+            import(place.path(), &output, &options(Sample::Half), QUIET).expect_err("refused").to_string();
         assert!(wanted.iter().all(|part| said.contains(part)), "{said}");
         assert!(!output.exists());
     }
@@ -613,28 +792,54 @@ mod tests {
     #[test]
     fn bad_folders_are_refused_with_the_file_and_the_place() {
         const BAD: &str = "tl030_pl000_tv000_pv000.exr";
-        for (value, text) in [(f32::NAN, "NaN"), (f32::INFINITY, "inf"), (f32::NEG_INFINITY, "-inf"), (70_000.0, "--float holds it")] {
+        for (value, text) in [
+            (f32::NAN, "NaN"),
+            (f32::INFINITY, "inf"),
+            (f32::NEG_INFINITY, "-inf"),
+            (70_000.0, "--float holds it"),
+        ] {
             let spoil = |texel, c| if (texel, c) == (4, 2) { value } else { 0.5 };
             refused(&[BAD, "pixel (1, 1), blue", text], |folder| exr(&folder.join(BAD), [3, 2], spoil));
         }
         refused(&[BAD, "tl000_pl000", "2 x 3", "3 x 2"], |folder| exr(&folder.join(BAD), [2, 3], |_, _| 0.5));
-        refused(&["1 of 4 pairs", "tl000_pl000_tv060_pv000"], |folder| exr(&folder.join("tl30pl0tv60pv0.exr"), [3, 2], |_, _| 0.5));
-        refused(&[BAD, "TL30.004pl359.999tv0pv9.exr"], |folder| exr(&folder.join("TL30.004pl359.999tv0pv9.exr"), [3, 2], |_, _| 0.5));
-        refused(&["preview.png", "name"], |folder| fs::write(folder.join("preview.png"), "").expect("written"));
+        refused(&["1 of 4 pairs", "tl000_pl000_tv060_pv000"], |folder| {
+            exr(&folder.join("tl30pl0tv60pv0.exr"), [3, 2], |_, _| 0.5)
+        });
+        refused(&[BAD, "TL30.004pl359.999tv0pv9.exr"], |folder| {
+            exr(&folder.join("TL30.004pl359.999tv0pv9.exr"), [3, 2], |_, _| 0.5)
+        });
+        refused(&["preview.png", "name"], |folder| {
+            fs::write(folder.join("preview.png"), "").expect("written")
+        });
         refused(&["tl91", "polar"], |folder| exr(&folder.join("tl91pl0tv0pv0.exr"), [3, 2], |_, _| 0.5));
-        refused(&["no EXR, PNG"], |folder| fs::read_dir(folder).expect("read").for_each(|file| fs::remove_file(file.expect("one").path()).expect("removed")));
+        refused(&["no EXR, PNG"], |folder| {
+            fs::read_dir(folder)
+                .expect("read")
+                .for_each(|file| fs::remove_file(file.expect("one").path()).expect("removed"))
+        });
         refused(&[BAD], |folder| fs::write(folder.join(BAD), "no image").expect("written"));
-        refused(&["tl60"], |folder| fs::write(folder.join("tl60pl0tv0pv0.png"), "no image").expect("written"));
-        let json = |text: &'static str| move |folder: &Path| fs::write(folder.join(LISTING), text).expect("written");
+        refused(&["tl60"], |folder| {
+            fs::write(folder.join("tl60pl0tv0pv0.png"), "no image").expect("written")
+        });
+        let json =
+            |text: &'static str| move |folder: &Path| fs::write(folder.join(LISTING), text).expect("written");
         refused(&[LISTING], json("{"));
         refused(&[LISTING, "colour"], json(r#"{"colour": 1}"#));
         refused(&["no EXR, PNG"], json(r#"{"images": []}"#));
-        refused(&["missing.exr"], json(r#"{"images": [{"file": "missing.exr", "light": [0, 0], "view": [0, 0]}]}"#));
-        refused(&["../a.exr", "inside"], json(r#"{"images": [{"file": "../a.exr", "light": [0, 0], "view": [0, 0]}]}"#));
+        refused(
+            &["missing.exr"],
+            json(r#"{"images": [{"file": "missing.exr", "light": [0, 0], "view": [0, 0]}]}"#),
+        );
+        refused(
+            &["../a.exr", "inside"],
+            json(r#"{"images": [{"file": "../a.exr", "light": [0, 0], "view": [0, 0]}]}"#),
+        );
         refused(&[BAD, "none of those"], json(r#"{"lights": [[0, 0, 1]]}"#));
         refused(
             &[BAD, "none of those"],
-            json(r#"{"lights": [[0, 0, 0]], "images": [{"file": "tl030_pl000_tv000_pv000.exr", "light": [0, 0], "view": [0, 0]}]}"#),
+            json(
+                r#"{"lights": [[0, 0, 0]], "images": [{"file": "tl030_pl000_tv000_pv000.exr", "light": [0, 0], "view": [0, 0]}]}"#,
+            ),
         );
     }
 
@@ -642,11 +847,16 @@ mod tests {
     fn damaged_images_are_errors_and_no_panics() {
         let place = tempfile::tempdir().expect("a folder");
         let value = |texel: usize, c: usize| (texel * 3 + c) as f32 / 100.0;
-        let good = [("a.exr", to_exr([6, 5], Sample::Half, value).expect("encoded")), ("a.png", to_png([6, 5], value).expect("encoded").0)];
+        let good = [
+            ("a.exr", to_exr([6, 5], Sample::Half, value).expect("encoded")),
+            ("a.png", to_png([6, 5], value).expect("encoded").0),
+        ];
         for (name, good) in good {
             let path = place.path().join(name);
             for at in 0..good.len() {
-                for damaged in [good[..at].to_vec(), [&good[..at], &[good[at] ^ 0x81], &good[at + 1..]].concat()] {
+                for damaged in
+                    [good[..at].to_vec(), [&good[..at], &[good[at] ^ 0x81], &good[at + 1..]].concat()]
+                {
                     fs::write(&path, damaged).expect("written");
                     if let Ok(pixels) = decode(&path) {
                         assert_eq!(pixels.len(), 30);

@@ -7,7 +7,8 @@
 //! | [`ubo`] | a set of images in the layout of UBO2003 |
 //! | [`bytes`] | a file that is read at offsets and never trusted |
 //!
-//! The files of SparseBTF have a module of their own, [`crate::sparsebtf`]: they are not expanded but taken over as they are.
+//! The files of SparseBTF have a module of their own, [`crate::sparsebtf`]: they are not expanded but taken
+//! over as they are.
 
 pub mod archive;
 pub mod btf;
@@ -35,7 +36,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 pub struct ImportOptions {
     /// How values are stored.
     pub sample: Sample,
-    /// Whether values contain the cosine of the light's angle; if it is not said, as the data say, and if they do not, yes.
+    /// Whether values contain the cosine of the light's angle; if it is not said, as the data say, and if
+    /// they do not, yes.
     pub cosine_included: Option<bool>,
     /// Name of the material; if empty, that of the data.
     pub name: String,
@@ -43,7 +45,8 @@ pub struct ImportOptions {
     pub origin: String,
     /// Licence of the data; if empty, that of the data.
     pub licence: String,
-    /// Bytes for the images held at once. A single image that needs more than this, or than a megabyte, is refused.
+    /// Bytes for the images held at once. A single image that needs more than this, or than a megabyte, is
+    /// refused.
     pub memory: usize,
     /// What the three numbers of an image are.
     pub colours: Colours,
@@ -52,7 +55,15 @@ pub struct ImportOptions {
 impl Default for ImportOptions {
     fn default() -> ImportOptions {
         let [name, origin, licence] = Default::default();
-        ImportOptions { sample: Sample::Half, cosine_included: None, name, origin, licence, memory: 1 << 30, colours: Colours::Auto }
+        ImportOptions {
+            sample: Sample::Half,
+            cosine_included: None,
+            name,
+            origin,
+            licence,
+            memory: 1 << 30,
+            colours: Colours::Auto,
+        }
     }
 }
 
@@ -66,7 +77,10 @@ impl ImportOptions {
     /// A description of data, completed by what the user says.
     fn describe(&self, found: &Description) -> Description {
         let asked = [&self.name, &self.origin, &self.licence];
-        let texts = std::array::from_fn(|i| if asked[i].is_empty() { clean(&found.texts[i]) } else { asked[i].clone() });
+        let texts =
+            std::array::from_fn(
+                |i| if asked[i].is_empty() { clean(&found.texts[i]) } else { asked[i].clone() },
+            );
         let cosine_included = self.cosine_included.unwrap_or(found.cosine_included);
         Description { sample: self.sample, cosine_included, texts, ..found.clone() }
     }
@@ -74,7 +88,12 @@ impl ImportOptions {
 
 /// A text of others as a file may have it (3.4-3): without what is not seen, and not long.
 pub fn clean(text: &str) -> String {
-    text.chars().filter(|&c| !selvedge::metadata::is_invisible(c)).take(200).collect::<String>().trim().to_owned()
+    text.chars()
+        .filter(|&c| !selvedge::metadata::is_invisible(c))
+        .take(200)
+        .collect::<String>()
+        .trim()
+        .to_owned()
 }
 
 /// What came of an import.
@@ -129,7 +148,11 @@ pub fn detect(path: &Path) -> Result<Kind> {
         return Ok(if sparsebtf::materials_in(path)?.is_empty() { Kind::Folder } else { Kind::SparseBtf });
     }
     let mut start = Vec::new();
-    File::open(path).map_err(ToolError::io(path))?.take(64).read_to_end(&mut start).map_err(ToolError::io(path))?;
+    File::open(path)
+        .map_err(ToolError::io(path))?
+        .take(64)
+        .read_to_end(&mut start)
+        .map_err(ToolError::io(path))?;
     if start.starts_with(&selvedge::header::MAGIC) {
         Ok(if inspect::is_dictionary(&start) { Kind::Dictionary } else { Kind::Material })
     } else if Dataset::is_one(path) {
@@ -144,11 +167,18 @@ pub fn detect(path: &Path) -> Result<Kind> {
     }
 }
 
-/// Makes a dataset of a `.btf`, batch by batch of texels; `progress` hears how many of how many texels are done.
+/// Makes a dataset of a `.btf`, batch by batch of texels; `progress` hears how many of how many texels are
+/// done.
 ///
 /// # Errors
-/// If the file is not as its layout says; if a value is infinite or beyond what `options.sample` holds; on I/O. There is no dataset then.
-pub fn import_btf(btf: &Btf, output: &Path, options: &ImportOptions, progress: &(dyn Fn(usize, usize) + Sync)) -> Result<Imported> {
+/// If the file is not as its layout says; if a value is infinite or beyond what `options.sample` holds; on
+/// I/O. There is no dataset then.
+pub fn import_btf(
+    btf: &Btf,
+    output: &Path,
+    options: &ImportOptions,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Imported> {
     let head = btf.head();
     let writer = Writer::create(output, options.describe(&btf.description()))?;
     let (texels, length, batch) = (head.size[0] * head.size[1], btf.texel_len(), btf.batch());
@@ -164,8 +194,13 @@ pub fn import_btf(btf: &Btf, output: &Path, options: &ImportOptions, progress: &
                 let (number, pair) = (first + i, n / 3);
                 let [x, y] = [number % head.size[0], number / head.size[0]];
                 let [light, view] = [pair % head.lights.len(), pair / head.lights.len()];
-                let what = format!("texel ({x}, {y}), light {light}, view {view}: {}", options.refusal(texel[n]));
-                return Err(ToolError::Foreign { path: btf.path().to_owned(), offset: btf.offset(number), what });
+                let what =
+                    format!("texel ({x}, {y}), light {light}, view {view}: {}", options.refusal(texel[n]));
+                return Err(ToolError::Foreign {
+                    path: btf.path().to_owned(),
+                    offset: btf.offset(number),
+                    what,
+                });
             }
             writer.put(first + i, 0, texel)?;
         }
@@ -179,10 +214,16 @@ pub fn import_btf(btf: &Btf, output: &Path, options: &ImportOptions, progress: &
     let mut notes = Vec::new();
     if clipped.count > 0 {
         let all = texels as u64 * length as u64;
-        notes.push(format!("{} of {all} values were negative, the least {}, as factorisations leave them; they are 0 now", clipped.count, clipped.least));
+        notes.push(format!(
+            "{} of {all} values were negative, the least {}, as factorisations leave them; they are 0 now",
+            clipped.count, clipped.least
+        ));
     }
     if head.rotated > 0 {
-        notes.push(format!("{} of {} frames of texels are not the identity; values stay in the frames they have", head.rotated, head.rotations));
+        notes.push(format!(
+            "{} of {} frames of texels are not the identity; values stay in the frames they have",
+            head.rotated, head.rotations
+        ));
     }
     if options.cosine_included.is_none() {
         match head.cosine_included {
@@ -220,9 +261,14 @@ impl Btf {
     pub fn description(&self) -> Description {
         let head = self.head();
         let parts = [&head.setup, &head.sensor, &head.light_source].map(String::as_str);
-        let parts: Vec<&str> = std::iter::once(&head.signature[1..]).chain(parts).filter(|part| !part.is_empty()).collect();
+        let parts: Vec<&str> =
+            std::iter::once(&head.signature[1..]).chain(parts).filter(|part| !part.is_empty()).collect();
         let nm = 1e6 / f64::from(head.pixels_per_mm);
-        let texel_nm = if head.pixels_per_mm > 0.0 && nm < f64::from(u32::MAX) { [nm.round() as u32; 2] } else { [0; 2] };
+        let texel_nm = if head.pixels_per_mm > 0.0 && nm < f64::from(u32::MAX) {
+            [nm.round() as u32; 2]
+        } else {
+            [0; 2]
+        };
         Description {
             size: head.size,
             lights: known_grid(&head.lights),
@@ -237,7 +283,9 @@ impl Btf {
 
 /// The directions of a known grid, if these are its but for the rounding of binary32; else themselves.
 fn known_grid(set: &[DVec3]) -> Vec<DVec3> {
-    let is_grid = |grid: &Vec<DVec3>| grid.iter().zip(set).all(|(&a, &b)| images::degrees_between(a, b) < images::SAME_DEGREES);
+    let is_grid = |grid: &Vec<DVec3>| {
+        grid.iter().zip(set).all(|(&a, &b)| images::degrees_between(a, b) < images::SAME_DEGREES)
+    };
     directions::grid(set.len()).filter(is_grid).unwrap_or_else(|| set.to_vec())
 }
 
@@ -285,7 +333,11 @@ impl ForeignInfo {
     /// For people.
     pub fn text(&self) -> String {
         let known = |text: &str| if text.is_empty() { "-".to_owned() } else { text.to_owned() };
-        let texel = if self.texel_nm == [0; 2] { "unknown".into() } else { format!("{} x {} nm", self.texel_nm[0], self.texel_nm[1]) };
+        let texel = if self.texel_nm == [0; 2] {
+            "unknown".into()
+        } else {
+            format!("{} x {} nm", self.texel_nm[0], self.texel_nm[1])
+        };
         let mut text = format!(
             "{}\n  format      {}\n  origin      {}\n  licence     {}\n  size        {} x {} texels of {texel}\n  directions  {} light, {} view\n  cosine      {}\n  dataset     {} bytes in binary16\n",
             known(&self.texts[0]),
@@ -300,7 +352,10 @@ impl ForeignInfo {
             self.dataset_bytes,
         );
         if let Some(s) = &self.statistics {
-            text += &format!("  values      mean {:.6}, {:.6}, {:.6}; {} to {}\n", s.mean[0], s.mean[1], s.mean[2], s.least, s.largest);
+            text += &format!(
+                "  values      mean {:.6}, {:.6}, {:.6}; {} to {}\n",
+                s.mean[0], s.mean[1], s.mean[2], s.least, s.largest
+            );
         }
         if let Some(head) = &self.btf {
             text += &format!("  stored      {}\n  channels    {}\n", head.layout, head.channels.join(", "));
@@ -308,7 +363,10 @@ impl ForeignInfo {
                 text += &format!("  height map  {width} x {height}\n");
             }
             if head.rotations > 0 {
-                text += &format!("  rotations   {}, of which {} are not the identity\n", head.rotations, head.rotated);
+                text += &format!(
+                    "  rotations   {}, of which {} are not the identity\n",
+                    head.rotations, head.rotated
+                );
             }
             if head.unread > 0 {
                 text += &format!("  unread      {} bytes behind the values\n", head.unread);
@@ -347,8 +405,17 @@ pub fn info(path: &Path, kind: Kind, memory: usize) -> Result<ForeignInfo> {
                 texts: [names.join(", "), String::new(), String::new()],
                 ..Description::default()
             };
-            let channels: Vec<&str> = ["Y", "U", "V"].into_iter().zip(&material.channels).filter(|(_, c)| c.is_some()).map(|(name, _)| name).collect();
-            Ok(ForeignInfo::new(kind, format!("coefficients of SparseBTF, channels {}, {count} directions", channels.join(", ")), &description))
+            let channels: Vec<&str> = ["Y", "U", "V"]
+                .into_iter()
+                .zip(&material.channels)
+                .filter(|(_, c)| c.is_some())
+                .map(|(name, _)| name)
+                .collect();
+            Ok(ForeignInfo::new(
+                kind,
+                format!("coefficients of SparseBTF, channels {}, {count} directions", channels.join(", ")),
+                &description,
+            ))
         }
         _ => {
             let set = ImageSet::open(path, memory)?;

@@ -1,7 +1,8 @@
 //! A dataset as a zip archive in the layout of UBO2003, which other people's readers open.
 //!
-//! `NAME/tvTTT_pvPPP/NNNNN tlTTT plPPP tvTTT pvPPP.jpg`: whole degrees in three digits, polar angle and azimuth of light and view, a folder for each view;
-//! `NNNNN` counts the views. Pictures are JPEG of 8 bits in sRGB, so values above 1 are cut and every value has the error of a JPEG.
+//! `NAME/tvTTT_pvPPP/NNNNN tlTTT plPPP tvTTT pvPPP.jpg`: whole degrees in three digits, polar angle and
+//! azimuth of light and view, a folder for each view; `NNNNN` counts the views. Pictures are JPEG of 8 bits
+//! in sRGB, so values above 1 are cut and every value has the error of a JPEG.
 
 use super::images::{SAME_DEGREES, degrees_between};
 use super::pixels::to_srgb;
@@ -48,7 +49,12 @@ fn whole(direction: DVec3) -> ([u32; 2], f64) {
 ///
 /// # Errors
 /// If two directions have the same whole degrees, and on I/O.
-pub fn export(dataset: &Dataset, path: &Path, options: &Options, progress: &dyn Fn(usize, usize)) -> Result<Exported> {
+pub fn export(
+    dataset: &Dataset,
+    path: &Path,
+    options: &Options,
+    progress: &dyn Fn(usize, usize),
+) -> Result<Exported> {
     let description = dataset.description();
     let mut exported = Exported::default();
     let sets = [("light", &description.lights), ("view", &description.views)].map(|(what, set)| -> Result<Vec<[u32; 2]>> {
@@ -71,10 +77,17 @@ pub fn export(dataset: &Dataset, path: &Path, options: &Options, progress: &dyn 
     let [lights, views] = sets;
     let (lights, views) = (lights?, views?);
 
-    let name: String = description.texts[0].chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).take(60).collect();
+    let name: String = description.texts[0]
+        .chars()
+        .map(|c| if c.is_ascii_alphanumeric() { c } else { '_' })
+        .take(60)
+        .collect();
     let name = if name.is_empty() { "material" } else { &name };
     let bad = |what: String| ToolError::Picture { path: path.to_owned(), what };
-    let beside = tempfile::Builder::new().prefix(".selvedge-").tempfile_in(folder_of(path)).map_err(|error| ToolError::io(path)(error.kind().into()))?;
+    let beside = tempfile::Builder::new()
+        .prefix(".selvedge-")
+        .tempfile_in(folder_of(path))
+        .map_err(|error| ToolError::io(path)(error.kind().into()))?;
     let mut zip = zip::ZipWriter::new(BufWriter::new(beside));
     // JPEG does not get smaller.
     let entry = zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
@@ -95,8 +108,11 @@ pub fn export(dataset: &Dataset, path: &Path, options: &Options, progress: &dyn 
                     })
                     .collect();
                 let mut bytes = Vec::new();
-                let mut encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, options.quality);
-                encoder.encode(&shown, width as u32, height as u32, image::ExtendedColorType::Rgb8).map_err(|error| error.to_string())?;
+                let mut encoder =
+                    image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, options.quality);
+                encoder
+                    .encode(&shown, width as u32, height as u32, image::ExtendedColorType::Rgb8)
+                    .map_err(|error| error.to_string())?;
                 Ok((bytes, cut))
             })
             .collect();
@@ -104,7 +120,8 @@ pub fn export(dataset: &Dataset, path: &Path, options: &Options, progress: &dyn 
             let (bytes, cut) = made.map_err(bad)?;
             let (view, light) = ((first + i) / lights.len(), (first + i) % lights.len());
             let ([tl, pl], [tv, pv]) = (lights[light], views[view]);
-            let file = format!("{name}/tv{tv:03}_pv{pv:03}/{view:05} tl{tl:03} pl{pl:03} tv{tv:03} pv{pv:03}.jpg");
+            let file =
+                format!("{name}/tv{tv:03}_pv{pv:03}/{view:05} tl{tl:03} pl{pl:03} tv{tv:03} pv{pv:03}.jpg");
             zip.start_file(file, entry).map_err(|error| bad(error.to_string()))?;
             zip.write_all(&bytes).map_err(ToolError::io(path))?;
             exported.cut += cut;

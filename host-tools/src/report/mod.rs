@@ -1,7 +1,9 @@
-//! Error against run time: every method and baseline over a sweep of its quality on some datasets, as tables, plots, pictures and one page.
+//! Error against run time: every method and baseline over a sweep of its quality on some datasets, as tables,
+//! plots, pictures and one page.
 //!
-//! A line of the table ([`Line`]) is complete when it is written: it is appended to `measured.jsonl` in the folder of the report, and a later run
-//! with the same dataset, method and setting takes it from there. Files that were encoded lie in `files/`.
+//! A line of the table ([`Line`]) is complete when it is written: it is appended to `measured.jsonl` in the
+//! folder of the report, and a later run with the same dataset, method and setting takes it from there. Files
+//! that were encoded lie in `files/`.
 
 pub mod page;
 pub mod plot;
@@ -35,8 +37,8 @@ pub struct Request {
     pub held_out: bool,
     /// Methods whose names contain one of these; all if empty.
     pub methods: Vec<String>,
-    /// Errors are taken at every so many-th light of each view, the first of them moving from view to view; `None` for as many as keep
-    /// [`COMPARED`].
+    /// Errors are taken at every so many-th light of each view, the first of them moving from view to view;
+    /// `None` for as many as keep [`COMPARED`].
     pub every: Option<usize>,
 }
 
@@ -81,12 +83,18 @@ pub struct Operations {
 impl Operations {
     /// Of a file.
     pub fn of_file(file: &Selvedge<'_>) -> Operations {
-        Operations::of_random(Some(file.header().operations), |q| count::filtered(file, 0, q.u_q32, q.v_q32, q.light, q.view).operations)
+        Operations::of_random(Some(file.header().operations), |q| {
+            count::filtered(file, 0, q.u_q32, q.v_q32, q.light, q.view).operations
+        })
     }
 
     fn of_random(stated: Option<u32>, count: impl Fn(&FilteredQuery) -> u64) -> Operations {
         let counts: Vec<u64> = speed::random_queries(2000).iter().map(count).collect();
-        Operations { mean: counts.iter().sum::<u64>() as f64 / counts.len() as f64, largest: counts.into_iter().max().unwrap_or(0), stated }
+        Operations {
+            mean: counts.iter().sum::<u64>() as f64 / counts.len() as f64,
+            largest: counts.into_iter().max().unwrap_or(0),
+            stated,
+        }
     }
 }
 
@@ -127,7 +135,8 @@ pub struct Line {
     pub encode_seconds: f64,
     /// Seconds of `open`, for files.
     pub open_seconds: Option<f64>,
-    /// Largest resident memory since the work began that its method shares between settings, bytes, where the system tells it.
+    /// Largest resident memory since the work began that its method shares between settings, bytes, where
+    /// the system tells it.
     pub peak_memory: Option<u64>,
     /// What training or encoding found and a user should know.
     pub found: String,
@@ -172,12 +181,28 @@ impl<'a> Subject<'a> {
         }
     }
 
-    /// Errors against data, at every so many-th light of each view. What is equal has no finite ratio, which a table of numbers could not hold.
+    /// Errors against data, at every so many-th light of each view. What is equal has no finite ratio, which
+    /// a table of numbers could not hold.
     ///
     /// # Errors
     /// If data cannot be read.
-    pub fn metrics(&self, locator: &Locator<'_>, data: &Dataset, every: usize, offset: f32, peak: f32) -> Result<Metrics> {
-        let found = compare_every(every, Source::Data(data), self.source(locator), data.description(), offset, Some(peak as f64), &|_, _| ())?;
+    pub fn metrics(
+        &self,
+        locator: &Locator<'_>,
+        data: &Dataset,
+        every: usize,
+        offset: f32,
+        peak: f32,
+    ) -> Result<Metrics> {
+        let found = compare_every(
+            every,
+            Source::Data(data),
+            self.source(locator),
+            data.description(),
+            offset,
+            Some(peak as f64),
+            &|_, _| (),
+        )?;
         Ok(Metrics { psnr_db: found.psnr_db.clamp(-999.0, 999.0), ..found })
     }
 
@@ -191,7 +216,8 @@ impl<'a> Subject<'a> {
                 let find = if decoder.two_nearest() {
                     3 * (locator.lights.len() + locator.views.len()) as u64
                 } else {
-                    count::locate(locator.file, m.light_start, q.light) + count::locate(locator.file, m.view_start, q.view)
+                    count::locate(locator.file, m.light_start, q.light)
+                        + count::locate(locator.file, m.view_start, q.view)
                 };
                 decoder.operations(&locator.at(q, decoder.two_nearest())) + POSITION + find
             }),
@@ -233,13 +259,31 @@ pub fn pairs_looked_at(description: &Description) -> Vec<[usize; 2]> {
 
 impl<'a> Bench<'a> {
     /// Reads what is compared with.
-    pub fn new(data: &'a Dataset, locator: &'a Locator<'a>, adapter: &'a Adapter, every: Option<usize>, out: &'a Path) -> Result<Bench<'a>> {
-        let image = |pair: [usize; 2]| Ok((pair, measure::image(Source::Data(data), data.description(), pair[0], pair[1])?));
+    pub fn new(
+        data: &'a Dataset,
+        locator: &'a Locator<'a>,
+        adapter: &'a Adapter,
+        every: Option<usize>,
+        out: &'a Path,
+    ) -> Result<Bench<'a>> {
+        let image = |pair: [usize; 2]| {
+            Ok((pair, measure::image(Source::Data(data), data.description(), pair[0], pair[1])?))
+        };
         let looked_at = pairs_looked_at(data.description()).into_iter().map(image).collect::<Result<_>>()?;
         let mean = data.statistics().mean.iter().sum::<f64>() / 3.0;
         let description = data.description();
-        let every = every.unwrap_or((description.texels() * description.pairs()).div_ceil(COMPARED)).clamp(1, description.lights.len());
-        Ok(Bench { data, locator, adapter, looked_at, every, exposure: if mean > 0.0 { (0.4 / mean) as f32 } else { 1.0 }, out })
+        let every = every
+            .unwrap_or((description.texels() * description.pairs()).div_ceil(COMPARED))
+            .clamp(1, description.lights.len());
+        Ok(Bench {
+            data,
+            locator,
+            adapter,
+            looked_at,
+            every,
+            exposure: if mean > 0.0 { (0.4 / mean) as f32 } else { 1.0 },
+            out,
+        })
     }
 
     /// Errors over all texels and views and every so many-th light.
@@ -252,7 +296,9 @@ impl<'a> Bench<'a> {
     pub fn similarity(&self, subject: &Subject<'_>) -> Result<[f64; 2]> {
         use rayon::prelude::*;
         let description = self.data.description();
-        let shown = |image: &[[f32; 3]]| -> Vec<[f32; 3]> { image.iter().map(|rgb| rgb.map(|c| (c * self.exposure).clamp(0.0, 1.0))).collect() };
+        let shown = |image: &[[f32; 3]]| -> Vec<[f32; 3]> {
+            image.iter().map(|rgb| rgb.map(|c| (c * self.exposure).clamp(0.0, 1.0))).collect()
+        };
         let both = |([light, view], reference): &([usize; 2], Vec<[f32; 3]>)| -> Result<[f64; 2]> {
             let image = measure::image(subject.source(self.locator), description, *light, *view)?;
             let (a, b) = (shown(reference), shown(&image));
@@ -268,14 +314,21 @@ impl<'a> Bench<'a> {
         let mut tiles = Vec::new();
         for i in [9, 38] {
             let ([light, view], reference) = &self.looked_at[i];
-            let decoded = subject.map(|s| measure::image(s.source(self.locator), description, *light, *view)).transpose()?;
+            let decoded = subject
+                .map(|s| measure::image(s.source(self.locator), description, *light, *view))
+                .transpose()?;
             let [width, height] = description.size;
             let offset = self.data.statistics().log_offset();
             let factor = (192 / width.max(height)).max(1);
             let shown = decoded.as_ref().unwrap_or(reference);
-            tiles.push(Picture { width, height, pixels: shown.clone() }.exposed(self.exposure).enlarged(factor));
+            tiles.push(
+                Picture { width, height, pixels: shown.clone() }.exposed(self.exposure).enlarged(factor),
+            );
             if let Some(decoded) = &decoded {
-                tiles.push(crate::picture::log_error(decoded, reference, description.size, offset, ERROR_WHITE).enlarged(factor));
+                tiles.push(
+                    crate::picture::log_error(decoded, reference, description.size, offset, ERROR_WHITE)
+                        .enlarged(factor),
+                );
             }
         }
         let name = format!("{name}.png");
@@ -316,13 +369,23 @@ impl<T: Keyed> Store<T> {
     /// Reads what is there; a last line that was cut off by a crash is left out.
     ///
     /// # Errors
-    /// If the file cannot be read, or not be mended, or has a line that this version does not understand: nothing measured is thrown away.
+    /// If the file cannot be read, or not be mended, or has a line that this version does not understand:
+    /// nothing measured is thrown away.
     pub fn open(path: PathBuf) -> Result<Store<T>> {
-        let text = if path.exists() { String::from_utf8_lossy(&files::read(&path)?).into_owned() } else { String::new() };
+        let text = if path.exists() {
+            String::from_utf8_lossy(&files::read(&path)?).into_owned()
+        } else {
+            String::new()
+        };
         let whole = text.rfind('\n').map_or("", |end| &text[..=end]);
         let parse = |(i, line): (usize, &str)| {
-            serde_json::from_str(line)
-                .map_err(|why| ToolError::Mismatch(format!("{}, line {}: of another version ({why}); begin in another folder", path.display(), i + 1)))
+            serde_json::from_str(line).map_err(|why| {
+                ToolError::Mismatch(format!(
+                    "{}, line {}: of another version ({why}); begin in another folder",
+                    path.display(),
+                    i + 1
+                ))
+            })
         };
         let lines: Vec<T> = whole.lines().enumerate().map(parse).collect::<Result<_>>()?;
         if whole != text {
@@ -336,7 +399,11 @@ impl<T: Keyed> Store<T> {
     /// # Errors
     /// If it cannot be written.
     pub fn add(&mut self, line: T) -> Result<()> {
-        let mut file = std::fs::OpenOptions::new().create(true).append(true).open(&self.path).map_err(ToolError::io(&self.path))?;
+        let mut file = std::fs::OpenOptions::new()
+            .create(true)
+            .append(true)
+            .open(&self.path)
+            .map_err(ToolError::io(&self.path))?;
         file.write_all(to_json_line(&line).as_bytes()).map_err(ToolError::io(&self.path))?;
         self.lines.push(line);
         Ok(())
@@ -361,7 +428,11 @@ pub fn methods_of<'l>(lines: &[&'l Line]) -> Vec<&'l str> {
 }
 
 /// Lines that no other of the same dataset beats in both: fewer of `cost` and less error.
-pub fn front<'l>(lines: &[&'l Line], cost: impl Fn(&Line) -> f64, error: impl Fn(&Line) -> f64) -> Vec<&'l Line> {
+pub fn front<'l>(
+    lines: &[&'l Line],
+    cost: impl Fn(&Line) -> f64,
+    error: impl Fn(&Line) -> f64,
+) -> Vec<&'l Line> {
     let mut sorted: Vec<&Line> = lines.to_vec();
     sorted.sort_by(|a, b| cost(a).total_cmp(&cost(b)).then(error(a).total_cmp(&error(b))));
     let mut best = f64::MAX;
@@ -473,7 +544,8 @@ mod tests {
     fn the_front_has_what_nothing_beats() {
         let lines = [line(10, 5.0), line(20, 6.0), line(20, 3.0), line(30, 3.0), line(40, 1.0), line(5, 9.0)];
         let all: Vec<&Line> = lines.iter().collect();
-        let found: Vec<u64> = front(&all, |l| l.bytes as f64, |l| l.metrics.linear_rms).iter().map(|l| l.bytes).collect();
+        let found: Vec<u64> =
+            front(&all, |l| l.bytes as f64, |l| l.metrics.linear_rms).iter().map(|l| l.bytes).collect();
         assert_eq!(found, [5, 10, 20, 40]);
     }
 
@@ -513,12 +585,20 @@ mod tests {
 
     #[test]
     fn the_pairs_looked_at_are_many_and_there() {
-        let description = Description { lights: vec![glam::DVec3::Z; 81], views: vec![glam::DVec3::Z; 40], ..Description::default() };
+        let description = Description {
+            lights: vec![glam::DVec3::Z; 81],
+            views: vec![glam::DVec3::Z; 40],
+            ..Description::default()
+        };
         let pairs = pairs_looked_at(&description);
         assert!(pairs.iter().all(|p| p[0] < 81 && p[1] < 40));
         let distinct: std::collections::BTreeSet<_> = pairs.iter().collect();
         assert!(distinct.len() == 64, "{}", distinct.len());
-        let one = Description { lights: vec![glam::DVec3::Z], views: vec![glam::DVec3::Z], ..Description::default() };
+        let one = Description {
+            lights: vec![glam::DVec3::Z],
+            views: vec![glam::DVec3::Z],
+            ..Description::default()
+        };
         assert!(pairs_looked_at(&one).iter().all(|p| *p == [0, 0]));
     }
 }

@@ -1,4 +1,5 @@
-//! The page: plots, tables and pictures in one HTML file without scripts, and the same numbers as CSV and JSON.
+//! The page: plots, tables and pictures in one HTML file without scripts, and the same numbers as CSV and
+//! JSON.
 
 use super::plot::{COSTS, ERRORS, draw};
 use super::{HeldOut, Kind, Line, Operations, methods_of, to_csv};
@@ -92,9 +93,11 @@ fn sorted<'l>(lines: &'l [Line], reference: &str) -> Vec<&'l Line> {
 
 /// Bytes of every method at errors that files reached, by interpolation between its measured points.
 fn at_equal_error(lines: &[&Line], error: fn(&Line) -> f64) -> String {
-    let methods: Vec<&str> = methods_of(lines).into_iter().filter(|method| *method != "uncompressed").collect();
+    let methods: Vec<&str> =
+        methods_of(lines).into_iter().filter(|method| *method != "uncompressed").collect();
     let curve = |method: &str| -> Vec<(f64, f64)> {
-        let mut points: Vec<(f64, f64)> = lines.iter().filter(|l| l.method == method).map(|l| (error(l), l.bytes as f64)).collect();
+        let mut points: Vec<(f64, f64)> =
+            lines.iter().filter(|l| l.method == method).map(|l| (error(l), l.bytes as f64)).collect();
         points.sort_by(|a, b| b.0.total_cmp(&a.0));
         points
     };
@@ -106,9 +109,15 @@ fn at_equal_error(lines: &[&Line], error: fn(&Line) -> f64) -> String {
             (ba.ln() + part * (bb.ln() - ba.ln())).exp()
         })
     };
-    // Levels: what files reached, those first at which most methods were measured on both sides, and apart from each other.
+    // Levels: what files reached, those first at which most methods were measured on both sides, and apart
+    // from each other.
     let coverage = |level: f64| methods.iter().filter(|method| bytes_at(method, level).is_some()).count();
-    let mut candidates: Vec<(usize, f64)> = lines.iter().filter(|l| l.kind == Kind::File).map(|l| error(l)).map(|level| (coverage(level), level)).collect();
+    let mut candidates: Vec<(usize, f64)> = lines
+        .iter()
+        .filter(|l| l.kind == Kind::File)
+        .map(|l| error(l))
+        .map(|level| (coverage(level), level))
+        .collect();
     candidates.sort_by(|a, b| b.0.cmp(&a.0).then(b.1.total_cmp(&a.1)));
     let mut levels: Vec<f64> = Vec::new();
     for (_, level) in candidates {
@@ -124,7 +133,8 @@ fn at_equal_error(lines: &[&Line], error: fn(&Line) -> f64) -> String {
         let file = lines.iter().any(|l| l.method == method && l.kind == Kind::File);
         let _ = write!(html, "<tr class=\"{}\"><td>{}</td>", if file { "file" } else { "" }, escaped(method));
         for &level in &levels {
-            let bytes = bytes_at(method, level).map_or("-".into(), |bytes| with_thousands(bytes.round() as u64));
+            let bytes =
+                bytes_at(method, level).map_or("-".into(), |bytes| with_thousands(bytes.round() as u64));
             let _ = write!(html, "<td>{bytes}</td>");
         }
         html += "</tr>";
@@ -139,9 +149,14 @@ fn main_table(lines: &[&Line]) -> String {
     let mut last = "";
     for l in lines {
         let (m, file) = (&l.metrics, l.kind == Kind::File);
-        let classes = format!("{}{}", if file { "file" } else { "" }, if l.method == last { "" } else { " group" });
+        let classes =
+            format!("{}{}", if file { "file" } else { "" }, if l.method == last { "" } else { " group" });
         last = &l.method;
-        let found = if l.found.is_empty() { String::new() } else { format!("<br><small>{}</small>", escaped(&l.found)) };
+        let found = if l.found.is_empty() {
+            String::new()
+        } else {
+            format!("<br><small>{}</small>", escaped(&l.found))
+        };
         let place = m.largest;
         let _ = write!(
             html,
@@ -194,8 +209,9 @@ fn speed_table(lines: &[&Line], cores: usize) -> String {
 }
 
 fn held_table(lines: &[&HeldOut]) -> String {
-    let mut html =
-        String::from("<table><tr><th>method</th><th>bytes</th><th>RMS linear, seen</th><th>held out</th><th>RMS log, seen</th><th>held out</th></tr>");
+    let mut html = String::from(
+        "<table><tr><th>method</th><th>bytes</th><th>RMS linear, seen</th><th>held out</th><th>RMS log, seen</th><th>held out</th></tr>",
+    );
     for h in lines {
         let _ = write!(
             html,
@@ -232,7 +248,11 @@ pub fn write_stability(verdicts: &[Verdict], out: &Path) -> Result<()> {
 <h1>Numerical stability</h1><p class=\"note\">{} cases, stiff and extreme; {}. Each has a bound that follows from its source, and is measured by the very routines that train, encode and decode. \
 </p><div class=\"wide\"><table><tr><th>case</th><th>condition</th><th class=\"t\">which is</th><th>bound</th><th>measured</th><th>part of the bound</th><th>verdict</th><th class=\"t\">where the bound comes from</th></tr>",
         verdicts.len(),
-        if broken == 0 { "all keep their bounds".to_owned() } else { format!("{broken} do not keep their bounds") }
+        if broken == 0 {
+            "all keep their bounds".to_owned()
+        } else {
+            format!("{broken} do not keep their bounds")
+        }
     );
     let mut group = "";
     for v in verdicts {
@@ -240,7 +260,8 @@ pub fn write_stability(verdicts: &[Verdict], out: &Path) -> Result<()> {
             group = v.group;
             let _ = write!(html, "<tr class=\"group file\"><td colspan=\"8\">{}</td></tr>", escaped(group));
         }
-        let verdict = if v.holds() { "<td class=\"good\">holds</td>" } else { "<td class=\"bad\">broken</td>" };
+        let verdict =
+            if v.holds() { "<td class=\"good\">holds</td>" } else { "<td class=\"bad\">broken</td>" };
         let cells = match &v.outcome {
             Ok(o) => {
                 let part = if o.bound > 0.0 { format!("{:.2}", o.measured / o.bound) } else { "-".into() };
@@ -254,7 +275,12 @@ pub fn write_stability(verdicts: &[Verdict], out: &Path) -> Result<()> {
             }
             Err(why) => format!("<td colspan=\"5\" class=\"t\">not measured: {}</td>", escaped(why)),
         };
-        let _ = write!(html, "<tr><td>{}</td>{cells}{verdict}<td class=\"t\"><small>{}</small></td></tr>", escaped(&v.name), escaped(v.source));
+        let _ = write!(
+            html,
+            "<tr><td>{}</td>{cells}{verdict}<td class=\"t\"><small>{}</small></td></tr>",
+            escaped(&v.name),
+            escaped(v.source)
+        );
     }
     html += "</table></div>";
     files::write(&out.join("stability.html"), html.as_bytes())
@@ -280,7 +306,8 @@ impl Page<'_> {
     pub fn write(&self, out: &Path) -> Result<()> {
         let Page { lines, held_out, adapter, cores, .. } = *self;
         files::write(&out.join("report.csv"), to_csv(lines).as_bytes())?;
-        let json = serde_json::to_vec_pretty(&Json { adapter, cores, lines, held_out }).map_err(|e| ToolError::Mismatch(e.to_string()))?;
+        let json = serde_json::to_vec_pretty(&Json { adapter, cores, lines, held_out })
+            .map_err(|e| ToolError::Mismatch(e.to_string()))?;
         files::write(&out.join("report.json"), &json)?;
         let mut html = format!(
             "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>Error against run time</title><style>{STYLE}</style><h1>Error against run time</h1>\
@@ -291,25 +318,47 @@ each in turn with a reference routine, with the farther end of their range. In <
 samples would; baselines have no batches. <i>One by one</i> has none for either. Operations are multiplications of a filtered sample: of 32-bit integers in files, with 102 for matrix, transfer and \
 presentation, of floats in baselines, with seven for an exponential. Peak memory is since the work began that a method's settings share. Kernel: {}.</p>{}",
             escaped(adapter),
-            if self.stability { "<p><a href=\"stability.html\">Numerical stability on stiff and extreme cases</a></p>" } else { "" }
+            if self.stability {
+                "<p><a href=\"stability.html\">Numerical stability on stiff and extreme cases</a></p>"
+            } else {
+                ""
+            }
         );
         for (name, reference) in datasets(lines) {
             let of = sorted(lines, reference);
             let (every, peak) = of.first().map_or((1, 0.0), |l| (l.every, l.metrics.peak));
-            let lights = if every == 1 { "at every light".to_owned() } else { format!("at one light of {every}, another at each view") };
-            let _ = write!(html, "<h2>{}</h2><p class=\"note\">Compared {lights}; largest value {peak}.</p>", escaped(name));
+            let lights = if every == 1 {
+                "at every light".to_owned()
+            } else {
+                format!("at one light of {every}, another at each view")
+            };
+            let _ = write!(
+                html,
+                "<h2>{}</h2><p class=\"note\">Compared {lights}; largest value {peak}.</p>",
+                escaped(name)
+            );
             for error in &ERRORS {
                 for cost in &COSTS {
                     match draw(&of, cost, error) {
                         Ok(svg) => {
-                            files::write(&out.join(format!("{}-{}-{}.svg", reference.trim_end_matches("-data.png"), error.short, cost.short)), svg.as_bytes())?;
+                            files::write(
+                                &out.join(format!(
+                                    "{}-{}-{}.svg",
+                                    reference.trim_end_matches("-data.png"),
+                                    error.short,
+                                    cost.short
+                                )),
+                                svg.as_bytes(),
+                            )?;
                             let _ = write!(
                                 html,
                                 "<figure>{svg}<figcaption>{} against {}. Dashed: values coded without a logarithm.</figcaption></figure>",
                                 error.name, cost.name
                             );
                         }
-                        Err(why) => html += &format!("<p>No plot of {} against {}: {why}.</p>", error.name, cost.name),
+                        Err(why) => {
+                            html += &format!("<p>No plot of {} against {}: {why}.</p>", error.name, cost.name)
+                        }
                     }
                 }
             }
@@ -319,9 +368,12 @@ presentation, of floats in baselines, with seven for an exponential. Peak memory
                 at_equal_error(&of, |l| l.metrics.linear_rms),
                 at_equal_error(&of, |l| l.metrics.log_rms)
             );
-            html +=
-                "<h3>Pictures</h3><p class=\"note\">Two pairs of directions, decoded and the error of the logarithm in false colour (black none, white 2).</p>";
-            let _ = write!(html, "<figure><img src=\"{}\" alt=\"the data\"><figcaption>the data</figcaption></figure><br>", embedded(out, reference));
+            html += "<h3>Pictures</h3><p class=\"note\">Two pairs of directions, decoded and the error of the logarithm in false colour (black none, white 2).</p>";
+            let _ = write!(
+                html,
+                "<figure><img src=\"{}\" alt=\"the data\"><figcaption>the data</figcaption></figure><br>",
+                embedded(out, reference)
+            );
             for l in of.iter().filter(|l| l.picture.is_some()) {
                 let source = embedded(out, l.picture.as_deref().unwrap_or_default());
                 let _ = write!(
@@ -334,7 +386,12 @@ presentation, of floats in baselines, with seven for an exponential. Peak memory
                     l.flip
                 );
             }
-            let _ = write!(html, "<h3>All settings</h3>{}<h3>Rates, millions of samples a second</h3>{}", main_table(&of), speed_table(&of, cores));
+            let _ = write!(
+                html,
+                "<h3>All settings</h3>{}<h3>Rates, millions of samples a second</h3>{}",
+                main_table(&of),
+                speed_table(&of, cores)
+            );
             let held: Vec<&HeldOut> = held_out.iter().filter(|h| h.dataset == name).collect();
             if !held.is_empty() {
                 let _ = write!(

@@ -27,16 +27,29 @@ pub const COSTS: [Axis; 3] = [
         short: "time",
         of: |l| Some(l.speed.random.median).filter(|r| *r > 0.0).map(|r| 1e9 / r),
     },
-    Axis { name: "operations of a filtered sample (mean)", short: "operations", of: |l| Some(l.operations.mean) },
+    Axis {
+        name: "operations of a filtered sample (mean)",
+        short: "operations",
+        of: |l| Some(l.operations.mean),
+    },
 ];
 
 /// Errors.
 pub const ERRORS: [Axis; 2] = [
-    Axis { name: "RMS error, linear radiance", short: "linear", of: |l| Some(l.metrics.linear_rms).filter(|e| *e > 0.0) },
-    Axis { name: "RMS error of ln(x + e)", short: "log", of: |l| Some(l.metrics.log_rms).filter(|e| *e > 0.0) },
+    Axis {
+        name: "RMS error, linear radiance",
+        short: "linear",
+        of: |l| Some(l.metrics.linear_rms).filter(|e| *e > 0.0),
+    },
+    Axis {
+        name: "RMS error of ln(x + e)",
+        short: "log",
+        of: |l| Some(l.metrics.log_rms).filter(|e| *e > 0.0),
+    },
 ];
 
-/// Colour of a method: files in strong ones, baselines in muted ones, chosen to be told apart by people with common colour blindness.
+/// Colour of a method: files in strong ones, baselines in muted ones, chosen to be told apart by people with
+/// common colour blindness.
 fn colour(method: &str) -> RGBColor {
     match method {
         m if m.starts_with("ensemble 2") => RGBColor(0, 60, 130),
@@ -66,7 +79,11 @@ fn short(v: f64) -> String {
 }
 
 fn trimmed(v: f64) -> String {
-    let digits = if v.abs() >= 100.0 { 0 } else { (2 - v.abs().max(1e-6).log10().floor() as i32).clamp(0, 6) as usize };
+    let digits = if v.abs() >= 100.0 {
+        0
+    } else {
+        (2 - v.abs().max(1e-6).log10().floor() as i32).clamp(0, 6) as usize
+    };
     let text = format!("{v:.digits$}");
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
@@ -87,13 +104,16 @@ fn told(error: impl Display) -> String {
 /// # Errors
 /// If there is nothing to draw.
 pub fn draw(lines: &[&Line], cost: &Axis, error: &Axis) -> Result<String, String> {
-    let place = |l: &Line| Some(((cost.of)(l)?, (error.of)(l)?)).filter(|(a, b)| a.is_finite() && b.is_finite() && *a > 0.0);
+    let place = |l: &Line| {
+        Some(((cost.of)(l)?, (error.of)(l)?)).filter(|(a, b)| a.is_finite() && b.is_finite() && *a > 0.0)
+    };
     let placed: Vec<(&Line, (f64, f64))> = lines.iter().filter_map(|l| Some((*l, place(l)?))).collect();
     if placed.is_empty() {
         return Err("nothing was measured".into());
     }
     let range = |of: fn(&(f64, f64)) -> f64| {
-        let (least, most) = placed.iter().fold((f64::MAX, f64::MIN), |(a, b), (_, p)| (a.min(of(p)), b.max(of(p))));
+        let (least, most) =
+            placed.iter().fold((f64::MAX, f64::MIN), |(a, b), (_, p)| (a.min(of(p)), b.max(of(p))));
         least / 1.25..most * 1.25
     };
     let (x, y) = (range(|p| p.0), range(|p| p.1));
@@ -106,7 +126,10 @@ pub fn draw(lines: &[&Line], cost: &Axis, error: &Axis) -> Result<String, String
             .margin(12)
             .x_label_area_size(46)
             .y_label_area_size(64)
-            .build_cartesian_2d(x.clone().log_scale().with_key_points(ticks(&x)), y.clone().log_scale().with_key_points(ticks(&y)))
+            .build_cartesian_2d(
+                x.clone().log_scale().with_key_points(ticks(&x)),
+                y.clone().log_scale().with_key_points(ticks(&y)),
+            )
             .map_err(told)?;
         chart
             .configure_mesh()
@@ -122,13 +145,18 @@ pub fn draw(lines: &[&Line], cost: &Axis, error: &Axis) -> Result<String, String
             .draw()
             .map_err(told)?;
         // The front beneath all: what nothing beats in cost and error.
-        let best = front(&placed.iter().map(|p| p.0).collect::<Vec<_>>(), |l| (cost.of)(l).unwrap_or(f64::MAX), |l| (error.of)(l).unwrap_or(f64::MAX));
+        let best = front(
+            &placed.iter().map(|p| p.0).collect::<Vec<_>>(),
+            |l| (cost.of)(l).unwrap_or(f64::MAX),
+            |l| (error.of)(l).unwrap_or(f64::MAX),
+        );
         let path: Vec<(f64, f64)> = best.iter().filter_map(|l| place(l)).collect();
         chart.draw_series(LineSeries::new(path, RGBColor(250, 214, 120).stroke_width(9))).map_err(told)?;
         let methods = methods_of(&placed.iter().map(|p| p.0).collect::<Vec<_>>());
         for (row, method) in methods.iter().enumerate() {
             let colour = colour(method);
-            let mut points: Vec<(&Line, (f64, f64))> = placed.iter().copied().filter(|(l, _)| l.method == *method).collect();
+            let mut points: Vec<(&Line, (f64, f64))> =
+                placed.iter().copied().filter(|(l, _)| l.method == *method).collect();
             points.sort_by(|a, b| a.1.0.total_cmp(&b.1.0).then(b.1.1.total_cmp(&a.1.1)));
             // In the order of budgets, so that a line does not fold where a cost hardly changes.
             let mut by_bytes = points.clone();
@@ -161,8 +189,12 @@ pub fn draw(lines: &[&Line], cost: &Axis, error: &Axis) -> Result<String, String
             legend.draw(&Text::new(method.to_string(), (42, y - 7), ("sans-serif", 13))).map_err(told)?;
         }
         let y = 24 + 22 * methods.len() as i32;
-        legend.draw(&PathElement::new([(4, y), (34, y)], RGBColor(250, 214, 120).stroke_width(9))).map_err(told)?;
-        legend.draw(&Text::new("Pareto front (filled points)", (42, y - 7), ("sans-serif", 13))).map_err(told)?;
+        legend
+            .draw(&PathElement::new([(4, y), (34, y)], RGBColor(250, 214, 120).stroke_width(9)))
+            .map_err(told)?;
+        legend
+            .draw(&Text::new("Pareto front (filled points)", (42, y - 7), ("sans-serif", 13)))
+            .map_err(told)?;
         root.present().map_err(told)?;
     }
     Ok(svg)
@@ -175,11 +207,17 @@ mod tests {
     #[test]
     fn ticks_are_within_a_range() {
         let found = ticks(&(0.03..0.6));
-        assert!(found.len() == 4 && found.iter().zip([0.05, 0.1, 0.2, 0.5]).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
+        assert!(
+            found.len() == 4 && found.iter().zip([0.05, 0.1, 0.2, 0.5]).all(|(a, b)| (a - b).abs() < 1e-12),
+            "{found:?}"
+        );
     }
 
     #[test]
     fn numbers_are_short() {
-        assert_eq!([1.0, 0.5, 0.05, 1500.0, 250_000.0, 2e6, 12.5].map(short), ["1", "0.5", "0.05", "1.5k", "250k", "2M", "12.5"].map(String::from));
+        assert_eq!(
+            [1.0, 0.5, 0.05, 1500.0, 250_000.0, 2e6, 12.5].map(short),
+            ["1", "0.5", "0.05", "1.5k", "250k", "2M", "12.5"].map(String::from)
+        );
     }
 }

@@ -107,7 +107,13 @@ fn kept<T>(result: Result<T>, what: &str, visitor: &Visitor<'_>) -> Result<Optio
     }
 }
 
-fn ensembles(data: &Dataset, domain: Domain, edges: &[usize], budgets: &[u64], visitor: &mut Visitor<'_>) -> Result<()> {
+fn ensembles(
+    data: &Dataset,
+    domain: Domain,
+    edges: &[usize],
+    budgets: &[u64],
+    visitor: &mut Visitor<'_>,
+) -> Result<()> {
     let method = |edge: usize| format!("ensemble {edge}, {}", name_of(domain));
     if edges.iter().all(|&edge| visitor.budgets(&method(edge), budgets).is_empty()) {
         return Ok(());
@@ -121,8 +127,13 @@ fn ensembles(data: &Dataset, domain: Domain, edges: &[usize], budgets: &[u64], v
         for budget in visitor.budgets(&method(edge), budgets) {
             (visitor.say)(&format!("{} at {budget} bytes", method(edge)));
             let begun = Instant::now();
-            let options = encode::Options { edge, goal: encode::Goal::Size(budget), ..encode::Options::default() };
-            let Some(encoded) = kept(encode::encode(&prepared, &bases, &options, &|_, _| ()), &method(edge), visitor)? else { continue };
+            let options =
+                encode::Options { edge, goal: encode::Goal::Size(budget), ..encode::Options::default() };
+            let Some(encoded) =
+                kept(encode::encode(&prepared, &bases, &options, &|_, _| ()), &method(edge), visitor)?
+            else {
+                continue;
+            };
             let coefficients: usize = encoded.coefficients.iter().sum();
             (visitor.visit)(Made {
                 method: method(edge),
@@ -138,7 +149,13 @@ fn ensembles(data: &Dataset, domain: Domain, edges: &[usize], budgets: &[u64], v
 }
 
 /// The sparse tensor, and the baselines that begin with the same components.
-fn components(data: &Dataset, domain: Domain, rank: usize, budgets: &[u64], visitor: &mut Visitor<'_>) -> Result<()> {
+fn components(
+    data: &Dataset,
+    domain: Domain,
+    rank: usize,
+    budgets: &[u64],
+    visitor: &mut Visitor<'_>,
+) -> Result<()> {
     let name = |method: &str| format!("{method}, {}", name_of(domain));
     let [of_tensor, of_pca, of_clusters, of_tucker] = ["tensor", "PCA", "local PCA", "Tucker"].map(name);
     let all = [&of_tensor, &of_pca, &of_clusters, &of_tucker];
@@ -163,7 +180,11 @@ fn components(data: &Dataset, domain: Domain, rank: usize, budgets: &[u64], visi
             method: of_pca.clone(),
             budget,
             setting: format!("{} components, {} bits", choice.rank, choice.bits),
-            found: if choice.rank == whole.rank() { "all components that were made".into() } else { String::new() },
+            found: if choice.rank == whole.rank() {
+                "all components that were made".into()
+            } else {
+                String::new()
+            },
             seconds: shared + begun.elapsed().as_secs_f64(),
             what: What::Baseline(Box::new(whole.decoder(choice.rank, choice.bits))),
         })?;
@@ -181,7 +202,11 @@ fn components(data: &Dataset, domain: Domain, rank: usize, budgets: &[u64], visi
             (visitor.say)(&format!("{of_tensor} at {budget} bytes"));
             let begun = Instant::now();
             let goal = tensor::Goal::Size(budget);
-            let Some((shape, _, encoded)) = kept(trials.encode(&[], goal, None, training, |_, _, _| ()), &of_tensor, visitor)? else { continue };
+            let Some((shape, _, encoded)) =
+                kept(trials.encode(&[], goal, None, training, |_, _, _| ()), &of_tensor, visitor)?
+            else {
+                continue;
+            };
             (visitor.visit)(Made {
                 method: of_tensor.clone(),
                 budget,
@@ -243,7 +268,12 @@ fn components(data: &Dataset, domain: Domain, rank: usize, budgets: &[u64], visi
             let description = data.description();
             let product = (budget as f64 / (width * height) as f64).max(2.0);
             let views = ((product / 3.0).sqrt().max(1.0) as usize).min(description.views.len());
-            [views, ((product / views as f64) as usize).min(3 * description.lights.len()).min(tucker::MOST_COLUMNS)]
+            [
+                views,
+                ((product / views as f64) as usize)
+                    .min(3 * description.lights.len())
+                    .min(tucker::MOST_COLUMNS),
+            ]
         };
         let [views, lights] = columns(most);
         let decomposed = tucker::tucker(&whole, views.max(1), lights.max(1))?;
@@ -263,7 +293,9 @@ fn components(data: &Dataset, domain: Domain, rank: usize, budgets: &[u64], visi
             (visitor.visit)(Made {
                 method: of_tucker.clone(),
                 budget,
-                setting: format!("{width} x {height} spatial, {views} view and {lights} light columns, 8 bits"),
+                setting: format!(
+                    "{width} x {height} spatial, {views} view and {lights} light columns, 8 bits"
+                ),
                 found: String::new(),
                 seconds: shared + begun.elapsed().as_secs_f64(),
                 what: What::Baseline(Box::new(decomposed.decoder(views, lights, 8))),
@@ -294,7 +326,10 @@ fn sparsebtf(data: &Dataset, budgets: &[u64], visitor: &mut Visitor<'_>) -> Resu
         (visitor.visit)(Made {
             method: METHOD.into(),
             budget,
-            setting: format!("{coefficients} coefficients a block; its dictionaries ({} bytes) are not counted", layout.dictionary_bytes()),
+            setting: format!(
+                "{coefficients} coefficients a block; its dictionaries ({} bytes) are not counted",
+                layout.dictionary_bytes()
+            ),
             found: String::new(),
             seconds: shared,
             what: What::Baseline(Box::new(layout.decoder(coefficients))),
@@ -336,13 +371,21 @@ fn everything(data: &Dataset, rank: usize, budgets: &[u64], visitor: &mut Visito
 fn subset(data: &Dataset, lights: &[usize], views: &[usize], path: &Path) -> Result<Dataset> {
     let description = data.description();
     let pick = |set: &[glam::DVec3], which: &[usize]| which.iter().map(|&i| set[i]).collect();
-    let own = Description { lights: pick(&description.lights, lights), views: pick(&description.views, views), ..description.clone() };
+    let own = Description {
+        lights: pick(&description.lights, lights),
+        views: pick(&description.views, views),
+        ..description.clone()
+    };
     let writer = Writer::create(path, own)?;
     let (mut bytes, mut texel) = (Vec::new(), vec![0.0; description.texel_len()]);
     for i in 0..description.texels() {
         data.read(i, 1, &mut bytes, &mut texel)?;
         let pair = |view: usize, light: usize| (view * description.lights.len() + light) * 3;
-        let values: Vec<f32> = views.iter().flat_map(|&v| lights.iter().map(move |&l| (v, l))).flat_map(|(v, l)| texel[pair(v, l)..][..3].to_vec()).collect();
+        let values: Vec<f32> = views
+            .iter()
+            .flat_map(|&v| lights.iter().map(move |&l| (v, l)))
+            .flat_map(|(v, l)| texel[pair(v, l)..][..3].to_vec())
+            .collect();
         writer.put(i, 0, &values)?;
     }
     writer.finish()?;
@@ -365,13 +408,19 @@ fn split(set: &[glam::DVec3]) -> [Vec<usize>; 2] {
 /// Something that finds directions: a small file of the same sets.
 fn finder(data: &Dataset) -> Result<Vec<u8>> {
     let prepared = prepare(vec![data], tensor::transfer_of(data, Domain::Log), &|_, _| ())?;
-    let options = encode::Options { edge: 8, goal: encode::Goal::Coefficients([1; 3]), ..encode::Options::default() };
+    let options =
+        encode::Options { edge: 8, goal: encode::Goal::Coefficients([1; 3]), ..encode::Options::default() };
     Ok(encode::encode(&prepared, &prepared.own_ensembles(8), &options, &|_, _| ())?.bytes)
 }
 
 fn locator<'a>(file: &'a selvedge::Selvedge<'a>, data: &Dataset) -> Locator<'a> {
     let description = data.description();
-    Locator { file, size: description.size, lights: description.lights.clone(), views: description.views.clone() }
+    Locator {
+        file,
+        size: description.size,
+        lights: description.lights.clone(),
+        views: description.views.clone(),
+    }
 }
 
 /// Methods and budgets that were asked for, by their keys: what a page shows.
@@ -392,7 +441,11 @@ fn identity(data: &Dataset) -> (String, String) {
     let [width, height] = description.size;
     let mean = statistics.mean.map(f64::to_bits);
     let largest = statistics.largest.to_bits();
-    let identity = format!("{name} {width}x{height}x{}x{} {mean:x?} {largest:x}", description.lights.len(), description.views.len());
+    let identity = format!(
+        "{name} {width}x{height}x{}x{} {mean:x?} {largest:x}",
+        description.lights.len(),
+        description.views.len()
+    );
     (name, identity)
 }
 
@@ -406,18 +459,29 @@ pub fn budgets(data: &Dataset, ratios: &[f64]) -> Vec<u64> {
     ratios.iter().map(|ratio| (data.description().half_bytes() as f64 / ratio) as u64).collect()
 }
 
-/// Measures a dataset; what the stores have already is left as it is. Gives the keys of all that was asked for.
+/// Measures a dataset; what the stores have already is left as it is. Gives the keys of all that was asked
+/// for.
 ///
 /// # Errors
 /// If data cannot be read or results not be written.
-pub fn measure(request: &Request, path: &Path, adapter: &Adapter, lines: &mut Store<Line>, held: &mut Store<HeldOut>, say: &dyn Fn(&str)) -> Result<Asked> {
+pub fn measure(
+    request: &Request,
+    path: &Path,
+    adapter: &Adapter,
+    lines: &mut Store<Line>,
+    held: &mut Store<HeldOut>,
+    say: &dyn Fn(&str),
+) -> Result<Asked> {
     let data = Dataset::open(path)?;
     let (name, identity) = identity(&data);
     let budgets = budgets(&data, &request.ratios);
     let version = env!("CARGO_PKG_VERSION");
     let cores = rayon::current_num_threads();
     let key = |method: &str, budget: u64| {
-        format!("{identity} | {method} | {budget} | {} | {:?} | {cores} | {} | {version} {REVISION}", request.rank, request.every, adapter.name)
+        format!(
+            "{identity} | {method} | {budget} | {} | {:?} | {cores} | {} | {version} {REVISION}",
+            request.rank, request.every, adapter.name
+        )
     };
     // Names of files and pictures: readable, and of this dataset alone.
     let prefix = format!("{}-{:08x}", slug(&name), short_hash(&identity));
@@ -426,7 +490,9 @@ pub fn measure(request: &Request, path: &Path, adapter: &Adapter, lines: &mut St
     let pictured = budgets[budgets.len() / 2];
 
     let known: BTreeSet<String> = lines.lines.iter().map(|line| line.key.clone()).collect();
-    let asked = |method: &str| request.methods.is_empty() || request.methods.iter().any(|m| method.contains(m.as_str()));
+    let asked = |method: &str| {
+        request.methods.is_empty() || request.methods.iter().any(|m| method.contains(m.as_str()))
+    };
     let is_wanted = |known: &BTreeSet<String>, method: &str, budget: u64| {
         let key = key(method, budget);
         let wanted = asked(method) && !known.contains(&key);
@@ -478,7 +544,12 @@ pub fn measure(request: &Request, path: &Path, adapter: &Adapter, lines: &mut St
         })
     };
     let say_name = |text: &str| say(&format!("{name}: {text}"));
-    everything(&data, request.rank, &budgets, &mut Visitor { wanted: &wanted, visit: &mut visit, say: &say_name, memory: &memory })?;
+    everything(
+        &data,
+        request.rank,
+        &budgets,
+        &mut Visitor { wanted: &wanted, visit: &mut visit, say: &say_name, memory: &memory },
+    )?;
     if request.held_out {
         let known: BTreeSet<String> = held.lines.iter().map(|line| line.key.clone()).collect();
         let wanted = |method: &str, budget: u64| is_wanted(&known, method, budget);
@@ -501,12 +572,16 @@ fn hold_out(
     say: &dyn Fn(&str),
 ) -> Result<()> {
     let description = data.description();
-    let ([held_lights, lights], [held_views, views]) = (split(&description.lights), split(&description.views));
+    let ([held_lights, lights], [held_views, views]) =
+        (split(&description.lights), split(&description.views));
     if held_lights.is_empty() || held_views.is_empty() || lights.len() < 3 || views.len() < 3 {
         say("too few directions to hold some out");
         return Ok(());
     }
-    let temporary = tempfile::Builder::new().prefix(".selvedge-").tempdir_in(&request.out).map_err(ToolError::io(&request.out))?;
+    let temporary = tempfile::Builder::new()
+        .prefix(".selvedge-")
+        .tempdir_in(&request.out)
+        .map_err(ToolError::io(&request.out))?;
     let seen = subset(data, &lights, &views, &temporary.path().join("seen.selvset"))?;
     let unseen = subset(data, &held_lights, &held_views, &temporary.path().join("unseen.selvset"))?;
     let finder_bytes = finder(&seen)?;
@@ -518,7 +593,9 @@ fn hold_out(
     let wanted = |method: &str, asked: u64| wanted(method, if asked == whole { whole } else { budget });
     let mut visit = |made: Made| -> Result<()> {
         made.what.with(|subject, bytes| {
-            let of = |part: &Dataset, every: usize| subject.metrics(&finds, part, every, offset, data.statistics().largest);
+            let of = |part: &Dataset, every: usize| {
+                subject.metrics(&finds, part, every, offset, data.statistics().largest)
+            };
             held.add(HeldOut {
                 key: key(&made.method, made.budget),
                 dataset: name.to_owned(),
@@ -529,8 +606,15 @@ fn hold_out(
             })
         })
     };
-    let say = |text: &str| say(&format!("{} lights and {} views held out: {text}", held_lights.len(), held_views.len()));
-    everything(&seen, request.rank, &[budget], &mut Visitor { wanted: &wanted, visit: &mut visit, say: &say, memory: &Memory::default() })
+    let say = |text: &str| {
+        say(&format!("{} lights and {} views held out: {text}", held_lights.len(), held_views.len()))
+    };
+    everything(
+        &seen,
+        request.rank,
+        &[budget],
+        &mut Visitor { wanted: &wanted, visit: &mut visit, say: &say, memory: &Memory::default() },
+    )
 }
 
 /// Progress on a terminal, a line each elsewhere.

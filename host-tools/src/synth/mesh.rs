@@ -27,7 +27,11 @@ impl Look {
     /// Part `t` of the way to another.
     pub fn towards(self, other: Look, t: f32) -> Look {
         let widths = std::array::from_fn(|i| self.widths[i] + (other.widths[i] - self.widths[i]) * t);
-        Look { albedo: self.albedo.lerp(other.albedo, t), specular: self.specular.lerp(other.specular, t), widths }
+        Look {
+            albedo: self.albedo.lerp(other.albedo, t),
+            specular: self.specular.lerp(other.specular, t),
+            widths,
+        }
     }
 }
 
@@ -53,7 +57,8 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// A tube to be swept; `u` runs from 0 to 1 along it, the angle around it from 0 (its side) over a quarter turn (its top).
+/// A tube to be swept; `u` runs from 0 to 1 along it, the angle around it from 0 (its side) over a quarter
+/// turn (its top).
 pub struct Tube<'a> {
     /// Steps along and around.
     pub steps: [usize; 2],
@@ -70,8 +75,14 @@ pub struct Tube<'a> {
 }
 
 impl Mesh {
-    /// Adds a height field with `steps` cells along both axes, from a height and a look of a place in the tile.
-    pub fn add_height_field(&mut self, steps: usize, height: impl Fn(f32, f32) -> f32, look: impl Fn(f32, f32) -> Look) {
+    /// Adds a height field with `steps` cells along both axes, from a height and a look of a place in the
+    /// tile.
+    pub fn add_height_field(
+        &mut self,
+        steps: usize,
+        height: impl Fn(f32, f32) -> f32,
+        look: impl Fn(f32, f32) -> Look,
+    ) {
         let step = 1.0 / steps as f32;
         let first = self.vertices.len() as u32;
         for j in 0..=steps {
@@ -96,7 +107,8 @@ impl Mesh {
         let [along, around] = tube.steps;
         let points: Vec<Vec3A> = (0..along * around)
             .map(|k| {
-                let (u, angle) = ((k / around) as f32 / along as f32, (k % around) as f32 / around as f32 * TAU);
+                let (u, angle) =
+                    ((k / around) as f32 / along as f32, (k % around) as f32 / around as f32 * TAU);
                 let forward = ((tube.centre)(u + 1e-3) - (tube.centre)(u - 1e-3)).normalize();
                 let side = forward.cross(Vec3A::Z).normalize();
                 let [width, height] = (tube.section)(u, angle);
@@ -116,7 +128,10 @@ impl Mesh {
                 let by_angle = (point(j, i + 1) - point(j, i - 1)) * (around as f32 / (2.0 * TAU));
                 let normal = by_u.cross(by_angle).normalize();
                 let fibre = by_u + by_angle * (TAU * tube.turns);
-                let (u, angle) = ((j as usize % along) as f32 / along as f32, (i as usize % around) as f32 / around as f32 * TAU);
+                let (u, angle) = (
+                    (j as usize % along) as f32 / along as f32,
+                    (i as usize % around) as f32 / around as f32 * TAU,
+                );
                 self.vertices.push(Vertex {
                     position: point(j, i),
                     normal,

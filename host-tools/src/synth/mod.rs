@@ -1,7 +1,7 @@
 //! BTFs of modelled mesostructures with shadowing, masking and interreflection.
 //!
-//! After Suykens et al. 2003, section 3: a small piece of geometry is looked at along every view through every
-//! texel, and lit from every direction. The six kinds here are triangle meshes that tile:
+//! After Suykens et al. 2003, section 3: a small piece of geometry is looked at along every view through
+//! every texel, and lit from every direction. The six kinds here are triangle meshes that tile:
 //!
 //! | module | does |
 //! |---|---|
@@ -11,8 +11,9 @@
 //! | [`shade`], [`preview`](mod@preview) | radiance; pictures for documentation |
 //!
 //! A tile is the unit square and less than 0.09 high. A texel is a square of the plane halfway up; a viewer
-//! sees it where rays through the stratified points of that square meet the surface. Texel rows ascend with y of
-//! the tangent frame. Nothing is random but the geometry: equal requests give equal bytes, whatever the threads.
+//! sees it where rays through the stratified points of that square meet the surface. Texel rows ascend with y
+//! of the tangent frame. Nothing is random but the geometry: equal requests give equal bytes, whatever the
+//! threads.
 //!
 //! What is left out: specular light between surfaces, light through yarns, and hairs. Highlights are those of
 //! the rays of a texel, without a filter over its area; more rays make textures finer than a texel calmer.
@@ -117,11 +118,16 @@ pub struct Request {
     pub sample: Sample,
 }
 
-/// Writes a dataset of a modelled surface; `progress` receives texels done and texels in all, from any thread.
+/// Writes a dataset of a modelled surface; `progress` receives texels done and texels in all, from any
+/// thread.
 ///
 /// # Errors
 /// For a count of directions or samples that is not offered, and what [`Writer`] refuses.
-pub fn synthesise(request: &Request, path: &Path, progress: &(dyn Fn(usize, usize) + Sync)) -> Result<Statistics> {
+pub fn synthesise(
+    request: &Request,
+    path: &Path,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Statistics> {
     let Some(grid) = directions::grid(request.directions) else {
         return Err(ToolError::Usage(format!("{} directions; 81 and 151 are known", request.directions)));
     };
@@ -135,7 +141,11 @@ pub fn synthesise(request: &Request, path: &Path, progress: &(dyn Fn(usize, usiz
         sample: request.sample,
         cosine_included: true,
         texel_nm: [0, 0],
-        texts: [request.kind.name().into(), format!("modelled mesostructure, seed {}", request.seed), "CC0-1.0".into()],
+        texts: [
+            request.kind.name().into(),
+            format!("modelled mesostructure, seed {}", request.seed),
+            "CC0-1.0".into(),
+        ],
     };
     let writer = Writer::create(path, description)?;
     write_texels(request.kind.mesh(request.seed), &writer, request.samples.isqrt(), progress)?;
@@ -143,7 +153,12 @@ pub fn synthesise(request: &Request, path: &Path, progress: &(dyn Fn(usize, usiz
 }
 
 /// Every texel of a surface, with `strata` rays along both axes of a texel.
-fn write_texels(mesh: mesh::Mesh, writer: &Writer, strata: usize, progress: &(dyn Fn(usize, usize) + Sync)) -> Result<()> {
+fn write_texels(
+    mesh: mesh::Mesh,
+    writer: &Writer,
+    strata: usize,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<()> {
     let description = writer.description();
     let vectors = |set: &[DVec3]| set.iter().map(|d| d.as_vec3a()).collect::<Vec<Vec3A>>();
     let views = vectors(&description.views);
@@ -165,7 +180,13 @@ fn stratified(index: usize, strata: usize) -> [f32; 2] {
 }
 
 /// Radiance of one texel: `[view][light][colour]`.
-fn texel_values(scene: &shade::Scene, views: &[Vec3A], size: [usize; 2], texel: usize, strata: usize) -> Vec<f32> {
+fn texel_values(
+    scene: &shade::Scene,
+    views: &[Vec3A],
+    size: [usize; 2],
+    texel: usize,
+    strata: usize,
+) -> Vec<f32> {
     let of_view = scene.lights() * 3;
     let mut values = vec![0.0; views.len() * of_view];
     let weight = 1.0 / (strata * strata) as f32;
@@ -173,7 +194,13 @@ fn texel_values(scene: &shade::Scene, views: &[Vec3A], size: [usize; 2], texel: 
     for (&view, sums) in views.iter().zip(values.chunks_exact_mut(of_view)) {
         for stratum in 0..strata * strata {
             let [u, v] = stratified(stratum, strata);
-            scene.add_radiance(at(texel % size[0], u, size[0]), at(texel / size[0], v, size[1]), view, weight, sums);
+            scene.add_radiance(
+                at(texel % size[0], u, size[0]),
+                at(texel / size[0], v, size[1]),
+                view,
+                weight,
+                sums,
+            );
         }
     }
     values
@@ -187,7 +214,14 @@ mod tests {
 
     fn description(size: [usize; 2], sample: Sample) -> Description {
         let set: Vec<DVec3> = directions::grid(81).expect("known").into_iter().step_by(5).collect();
-        Description { size, lights: set.clone(), views: set, sample, cosine_included: true, ..Description::default() }
+        Description {
+            size,
+            lights: set.clone(),
+            views: set,
+            sample,
+            cosine_included: true,
+            ..Description::default()
+        }
     }
 
     fn white() -> Look {
@@ -207,7 +241,10 @@ mod tests {
         for (l, light) in dataset.description().lights.iter().enumerate() {
             for view in 0..dataset.description().views.len() {
                 let image = dataset.image(l, view).expect("read");
-                assert!(image.iter().flatten().all(|&c| (f64::from(c) - light.z).abs() < 1e-3), "light {l}, view {view}: {image:?}");
+                assert!(
+                    image.iter().flatten().all(|&c| (f64::from(c) - light.z).abs() < 1e-3),
+                    "light {l}, view {view}: {image:?}"
+                );
             }
         }
     }
@@ -250,8 +287,19 @@ mod tests {
         }
         let said = "velvet".parse::<Mesostructure>().expect_err("unknown").to_string();
         assert!(said.contains("velvet") && said.contains("hammered"), "{said}");
-        let request = Request { kind: Mesostructure::Cloth, size: [1, 1], directions: 81, seed: 0, samples: 4, sample: Sample::Half };
-        for odd in [Request { directions: 80, ..request }, Request { samples: 5, ..request }, Request { size: [0, 1], ..request }] {
+        let request = Request {
+            kind: Mesostructure::Cloth,
+            size: [1, 1],
+            directions: 81,
+            seed: 0,
+            samples: 4,
+            sample: Sample::Half,
+        };
+        for odd in [
+            Request { directions: 80, ..request },
+            Request { samples: 5, ..request },
+            Request { size: [0, 1], ..request },
+        ] {
             assert!(synthesise(&odd, Path::new("never.selvset"), &|_, _| ()).is_err());
         }
     }
@@ -262,10 +310,19 @@ mod tests {
             let mesh = kind.mesh(3);
             let [low, high] = mesh.heights();
             assert!(high - low < 0.09, "{kind:?}: {low} to {high}");
-            assert!(mesh.vertices.iter().all(|v| v.position.is_finite() && (v.normal.length() - 1.0).abs() < 1e-4 && v.normal.dot(v.tangent).abs() < 1e-3));
-            assert!(mesh.vertices.iter().all(|v| v.look.albedo.min_element() >= 0.0 && v.look.albedo.max_element() <= 0.9), "{kind:?}");
+            assert!(mesh.vertices.iter().all(|v| v.position.is_finite()
+                && (v.normal.length() - 1.0).abs() < 1e-4
+                && v.normal.dot(v.tangent).abs() < 1e-3));
+            assert!(
+                mesh.vertices
+                    .iter()
+                    .all(|v| v.look.albedo.min_element() >= 0.0 && v.look.albedo.max_element() <= 0.9),
+                "{kind:?}"
+            );
             let (again, other) = (kind.mesh(3), kind.mesh(4));
-            let same = |a: &Mesh, b: &Mesh| a.vertices.iter().zip(&b.vertices).all(|(a, b)| a.position == b.position && a.look == b.look);
+            let same = |a: &Mesh, b: &Mesh| {
+                a.vertices.iter().zip(&b.vertices).all(|(a, b)| a.position == b.position && a.look == b.look)
+            };
             assert!(same(&mesh, &again) && !same(&mesh, &other), "{kind:?}");
         }
     }

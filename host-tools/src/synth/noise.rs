@@ -1,4 +1,5 @@
-//! Periodic value noise in two dimensions, from a repeatable table: variation of colour, width and path that still tiles.
+//! Periodic value noise in two dimensions, from a repeatable table: variation of colour, width and path that
+//! still tiles.
 
 use crate::random::Random;
 

@@ -29,20 +29,30 @@ pub fn preview(kind: Mesostructure, seed: u64, pixels: usize) -> Picture {
     let (sun, sky) = (vector(48.0, 150.0), &sky[1..]);
     let scene = Scene::new(kind.mesh(seed), vec![sun]);
     let around = Scene::new(softened(kind.mesh(seed)), sky.to_vec());
-    // The grid is even in angle, so a direction weighs by its solid angle; the sky is brighter above the light.
+    // The grid is even in angle, so a direction weighs by its solid angle; the sky is brighter above the
+    // light.
     let ring = |d: &Vec3A| sky.iter().filter(|other| (other.z - d.z).abs() < 1e-3).count() as f32;
-    let areas: Vec<f32> = sky.iter().map(|d| (1.0 - d.z * d.z).sqrt() / ring(d) * (1.0 + 0.9 * (d.x * sun.x + d.y * sun.y))).collect();
+    let areas: Vec<f32> = sky
+        .iter()
+        .map(|d| (1.0 - d.z * d.z).sqrt() / ring(d) * (1.0 + 0.9 * (d.x * sun.x + d.y * sun.y)))
+        .collect();
     let total: f32 = sky.iter().zip(&areas).map(|(d, area)| d.z * area).sum();
     let (width, height) = (pixels, (pixels as f32 * view.z) as usize);
     let pixel = |i: usize| {
         let mut sum = Vec3A::ZERO;
         for ray in 0..RAYS * RAYS {
             let at = |k: usize, part: usize| k as f32 + (part as f32 + 0.5) / RAYS as f32;
-            let (x, y) = (at(i % width, ray % RAYS) / width as f32, 1.0 - at(i / width, ray / RAYS) / height as f32);
+            let (x, y) =
+                (at(i % width, ray % RAYS) / width as f32, 1.0 - at(i / width, ray / RAYS) / height as f32);
             let (mut direct, mut of_sky) = ([0.0; 3], vec![0.0; sky.len() * 3]);
             scene.add_radiance(2.0 * x, 2.0 * y, view, 1.0, &mut direct);
             around.add_radiance(2.0 * x, 2.0 * y, view, AROUND / total, &mut of_sky);
-            let of_sky = of_sky.as_chunks::<3>().0.iter().zip(&areas).fold(Vec3A::ZERO, |sum, (&rgb, &area)| sum + Vec3A::from(rgb) * area);
+            let of_sky = of_sky
+                .as_chunks::<3>()
+                .0
+                .iter()
+                .zip(&areas)
+                .fold(Vec3A::ZERO, |sum, (&rgb, &area)| sum + Vec3A::from(rgb) * area);
             // Clipped ray by ray, as a display would, so that highlights have soft edges.
             sum += ((Vec3A::from(direct) * (1.0 - AROUND) + of_sky) * EXPOSURE).min(Vec3A::splat(2.0));
         }

@@ -44,7 +44,8 @@ impl Transport {
                     if mesh.face_normal(hit.triangle as usize).dot(direction) >= 0.0 {
                         return NOTHING;
                     }
-                    let nearest = (1..3).fold(0, |best, i| if hit.weights[i] > hit.weights[best] { i } else { best });
+                    let nearest =
+                        (1..3).fold(0, |best, i| if hit.weights[i] > hit.weights[best] { i } else { best });
                     mesh.triangles[hit.triangle as usize][nearest]
                 })
             })
@@ -59,7 +60,11 @@ impl Transport {
             .iter()
             .map(|v| {
                 let cosine = v.normal.dot(light);
-                if cosine > 0.0 { v.look.albedo * (cosine * table.lit(v.position, v.normal)) } else { Vec3A::ZERO }
+                if cosine > 0.0 {
+                    v.look.albedo * (cosine * table.lit(v.position, v.normal))
+                } else {
+                    Vec3A::ZERO
+                }
             })
             .collect();
         let once = self.gather(mesh, &first);
@@ -71,7 +76,8 @@ impl Transport {
     fn gather(&self, mesh: &Mesh, sent: &[Vec3A]) -> Vec<Vec3A> {
         let vertices = mesh.vertices.iter().zip(&self.seen);
         let gathered = vertices.map(|(vertex, seen)| {
-            let sum = seen.iter().filter(|&&i| i != NOTHING).fold(Vec3A::ZERO, |sum, &i| sum + sent[i as usize]);
+            let sum =
+                seen.iter().filter(|&&i| i != NOTHING).fold(Vec3A::ZERO, |sum, &i| sum + sent[i as usize]);
             vertex.look.albedo * sum / RAYS as f32
         });
         gathered.collect()

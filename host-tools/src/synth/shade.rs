@@ -67,7 +67,9 @@ impl Scene {
                 (table, bounced)
             })
             .unzip();
-        let bounced = (0..mesh.vertices.len()).flat_map(|vertex| by_light.iter().map(move |of_light| of_light[vertex])).collect();
+        let bounced = (0..mesh.vertices.len())
+            .flat_map(|vertex| by_light.iter().map(move |of_light| of_light[vertex]))
+            .collect();
         let [low, high] = mesh.heights();
         Scene { mesh, tracer, lights, tables, bounced, plane: (low + high) / 2.0 }
     }
@@ -82,7 +84,8 @@ impl Scene {
         self.lights.len()
     }
 
-    /// Adds the radiance from a place of the plane towards `view`, times `weight`, for every light: `[light][colour]`.
+    /// Adds the radiance from a place of the plane towards `view`, times `weight`, for every light:
+    /// `[light][colour]`.
     pub fn add_radiance(&self, x: f32, y: f32, view: Vec3A, weight: f32, sums: &mut [f32]) {
         let Some(hit) = self.tracer.seen(x, y, self.plane, view) else { return };
         let place = self.place(&hit, view);
@@ -98,7 +101,9 @@ impl Scene {
                 }
             }
             for c in 0..3 {
-                let indirect = bounced[0][c] * hit.weights[0] + bounced[1][c] * hit.weights[1] + bounced[2][c] * hit.weights[2];
+                let indirect = bounced[0][c] * hit.weights[0]
+                    + bounced[1][c] * hit.weights[1]
+                    + bounced[2][c] * hit.weights[2];
                 rgb[c] += (radiance[c] + indirect) * weight;
             }
         }
@@ -107,10 +112,14 @@ impl Scene {
     fn place(&self, hit: &Hit, view: Vec3A) -> Place {
         let corners = self.mesh.triangles[hit.triangle as usize].map(|i| &self.mesh.vertices[i as usize]);
         let [a, b, c] = hit.weights;
-        let mix = |of: fn(&super::mesh::Vertex) -> Vec3A| of(corners[0]) * a + of(corners[1]) * b + of(corners[2]) * c;
+        let mix = |of: fn(&super::mesh::Vertex) -> Vec3A| {
+            of(corners[0]) * a + of(corners[1]) * b + of(corners[2]) * c
+        };
         let normal = mix(|v| v.normal).normalize();
         let tangent = mix(|v| v.tangent);
-        let tangent = (tangent - normal * tangent.dot(normal)).try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector());
+        let tangent = (tangent - normal * tangent.dot(normal))
+            .try_normalize()
+            .unwrap_or_else(|| normal.any_orthonormal_vector());
         let frame = [tangent, normal.cross(tangent), normal];
         let mut local = to_frame(&frame, view);
         // A facet may be seen whose smooth normal points away: as if at the edge.
@@ -122,7 +131,11 @@ impl Scene {
             look: Look {
                 albedo: mix(|v| v.look.albedo),
                 specular: mix(|v| v.look.specular),
-                widths: std::array::from_fn(|i| corners[0].look.widths[i] * a + corners[1].look.widths[i] * b + corners[2].look.widths[i] * c),
+                widths: std::array::from_fn(|i| {
+                    corners[0].look.widths[i] * a
+                        + corners[1].look.widths[i] * b
+                        + corners[2].look.widths[i] * c
+                }),
             },
             view: local.normalize(),
         }

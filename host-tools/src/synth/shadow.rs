@@ -5,9 +5,9 @@
 //! four nearest cells are compared each with the receiver's plane at that cell, and blended.
 //!
 //! Against shadow rays from places that face the light, seen along every view of the 81 (the test
-//! `exactness_of_every_kind`, 1024 cells): the table is on the ray's side of one half for 99.9 % of the places
-//! of checker, rings and hammered, 99.7 % of cloth and knit, and 99.6 % of tissue. Its mean difference from the ray
-//! is 0.001 to 0.006 of the light. The rest lies within a cell of a shadow's edge.
+//! `exactness_of_every_kind`, 1024 cells): the table is on the ray's side of one half for 99.9 % of the
+//! places of checker, rings and hammered, 99.7 % of cloth and knit, and 99.6 % of tissue. Its mean difference
+//! from the ray is 0.001 to 0.006 of the light. The rest lies within a cell of a shadow's edge.
 
 use super::mesh::Mesh;
 use glam::{Vec2, Vec3A, vec2};
@@ -71,7 +71,8 @@ impl ShadowTable {
         let (below, above) = (wrap(y as i32) * CELLS, wrap(y as i32 + 1) * CELLS);
         let free = |cell: usize, plane: f32| if f32::from(self.heights[cell]) <= plane { 1.0 } else { 0.0 };
         let low = free(below + left, own) * (1.0 - u) + free(below + right, own + per_cell.x) * u;
-        let high = free(above + left, own + per_cell.y) * (1.0 - u) + free(above + right, own + per_cell.x + per_cell.y) * u;
+        let high = free(above + left, own + per_cell.y) * (1.0 - u)
+            + free(above + right, own + per_cell.x + per_cell.y) * u;
         low * (1.0 - v) + high * v
     }
 }
@@ -122,7 +123,8 @@ mod tests {
     use crate::synth::Mesostructure;
     use crate::synth::trace::Tracer;
 
-    /// Parts of places, seen from everywhere and facing a light, where table and ray agree, and the mean difference.
+    /// Parts of places, seen from everywhere and facing a light, where table and ray agree, and the mean
+    /// difference.
     fn exactness(kind: Mesostructure) -> [f64; 2] {
         let mesh = kind.mesh(1);
         let tracer = Tracer::new(&mesh);
@@ -131,14 +133,19 @@ mod tests {
         for (l, &light) in grid.iter().enumerate().step_by(7) {
             let table = ShadowTable::new(&mesh, light);
             for i in 0..2000 {
-                let (x, y, view) = ((i as f32 * 0.618_034).fract(), (i as f32 * 0.754_878).fract(), grid[(i * 5 + l) % grid.len()]);
+                let (x, y, view) = (
+                    (i as f32 * 0.618_034).fract(),
+                    (i as f32 * 0.754_878).fract(),
+                    grid[(i * 5 + l) % grid.len()],
+                );
                 let Some(hit) = tracer.seen(x, y, 0.0, view) else { continue };
                 let normal = mesh.face_normal(hit.triangle as usize);
                 if normal.dot(light) <= 0.02 {
                     continue;
                 }
                 let corners = mesh.corners(hit.triangle as usize);
-                let place = corners[0] * hit.weights[0] + corners[1] * hit.weights[1] + corners[2] * hit.weights[2];
+                let place =
+                    corners[0] * hit.weights[0] + corners[1] * hit.weights[1] + corners[2] * hit.weights[2];
                 let lit = table.lit(place, normal);
                 let by_ray = if tracer.blocked(place + normal * 1e-5, light) { 0.0 } else { 1.0 };
                 count += 1;
@@ -154,7 +161,10 @@ mod tests {
         for kind in [Mesostructure::Checker, Mesostructure::Cloth] {
             let [agreed, difference] = exactness(kind);
             println!("{kind:?}: {agreed:.4} agree, mean difference {difference:.4}");
-            assert!(agreed > 0.985 && difference < 0.02, "{kind:?}: {agreed} agree, mean difference {difference}");
+            assert!(
+                agreed > 0.985 && difference < 0.02,
+                "{kind:?}: {agreed} agree, mean difference {difference}"
+            );
         }
     }
 

@@ -16,7 +16,8 @@ pub fn checker(random: &mut Random) -> Mesh {
     let grain = Noise::new(random, 40, 40);
     // From 0 on the plane to 1 on the cells.
     let raised = |x: f32, y: f32| smooth_step(-0.12, 0.42, (TAU * 2.0 * x).sin() * (TAU * 2.0 * y).sin());
-    let (plane, cell) = (Look::glossy([0.05, 0.1, 0.42], [0.03; 3], 0.5), Look::glossy([0.68, 0.24, 0.36], [0.06; 3], 0.16));
+    let (plane, cell) =
+        (Look::glossy([0.05, 0.1, 0.42], [0.03; 3], 0.5), Look::glossy([0.68, 0.24, 0.36], [0.06; 3], 0.16));
     let mut mesh = Mesh::default();
     mesh.add_height_field(
         224,
@@ -34,7 +35,11 @@ pub fn rings(random: &mut Random) -> Mesh {
     let grain = Noise::new(random, 64, 64);
     let mut mesh = Mesh::default();
     let blue = Look::glossy([0.03, 0.07, 0.36], [0.05; 3], 0.14);
-    mesh.add_height_field(160, |x, y| 0.0003 * grain.at(x, y), |x, y| Look { albedo: blue.albedo * (1.0 + 0.08 * grain.at(y, x)), ..blue });
+    mesh.add_height_field(
+        160,
+        |x, y| 0.0003 * grain.at(x, y),
+        |x, y| Look { albedo: blue.albedo * (1.0 + 0.08 * grain.at(y, x)), ..blue },
+    );
     let gold = Look::glossy([0.14, 0.085, 0.02], [0.95, 0.66, 0.26], 0.24);
     for radius in [0.07f32, 0.17, 0.27, 0.37, 0.467] {
         let tone = 1.0 + 0.06 * signed(random);
@@ -45,7 +50,11 @@ pub fn rings(random: &mut Random) -> Mesh {
             turns: 0.0,
             centre: &|u| vec3a(0.5 + radius * (TAU * u).cos(), 0.5 + radius * (TAU * u).sin(), 0.024),
             section: &|_, _| [0.03, 0.03],
-            look: &|_, _| Look { albedo: gold.albedo * tone, specular: (gold.specular * tone).min(Vec3A::ONE), ..gold },
+            look: &|_, _| Look {
+                albedo: gold.albedo * tone,
+                specular: (gold.specular * tone).min(Vec3A::ONE),
+                ..gold
+            },
         });
     }
     mesh
@@ -56,7 +65,9 @@ pub fn hammered(random: &mut Random) -> Mesh {
     const SIDE: i32 = 7;
     let blows: Vec<(Vec2, f32, f32)> = (0..SIDE * SIDE)
         .map(|i| {
-            let place = vec2((i % SIDE) as f32, (i / SIDE) as f32) + 0.5 + 0.42 * vec2(signed(random), signed(random));
+            let place = vec2((i % SIDE) as f32, (i / SIDE) as f32)
+                + 0.5
+                + 0.42 * vec2(signed(random), signed(random));
             (place / SIDE as f32, 1.9 * (1.0 + 0.3 * signed(random)), 0.003 * signed(random))
         })
         .collect();
@@ -78,6 +89,9 @@ pub fn hammered(random: &mut Random) -> Mesh {
     let grain = Noise::new(random, 48, 48);
     let mut mesh = Mesh::default();
     let copper = Look::glossy([0.05, 0.025, 0.015], [0.93, 0.58, 0.42], 0.045);
-    mesh.add_height_field(288, height, |x, y| Look { specular: copper.specular * (0.92 + 0.08 * grain.at(x, y)), ..copper });
+    mesh.add_height_field(288, height, |x, y| Look {
+        specular: copper.specular * (0.92 + 0.08 * grain.at(x, y)),
+        ..copper
+    });
     mesh
 }

@@ -44,9 +44,11 @@ impl Tracer {
         let mut sources = Vec::new();
         for triangle in 0..mesh.triangles.len() {
             let corners = mesh.corners(triangle);
-            let (low, high) = (corners[0].min(corners[1]).min(corners[2]), corners[0].max(corners[1]).max(corners[2]));
+            let (low, high) =
+                (corners[0].min(corners[1]).min(corners[2]), corners[0].max(corners[1]).max(corners[2]));
             // All shifts by which the triangle meets the square.
-            let shifts = |low: f32, high: f32| (-MARGIN - high).ceil() as i32..=(1.0 + MARGIN - low).floor() as i32;
+            let shifts =
+                |low: f32, high: f32| (-MARGIN - high).ceil() as i32..=(1.0 + MARGIN - low).floor() as i32;
             for y in shifts(low.y, high.y) {
                 for x in shifts(low.x, high.x) {
                     let [v0, v1, v2] = corners.map(|corner| corner + vec3a(x as f32, y as f32, 0.0));
@@ -55,8 +57,13 @@ impl Tracer {
                 }
             }
         }
-        let bvh = build_cwbvh_from_tris(&copies, BvhBuildParams::fast_build(), &mut std::time::Duration::default());
-        let triangles = bvh.primitive_indices.iter().map(|&i| (RtTriangle::from(&copies[i as usize]), sources[i as usize])).collect();
+        let bvh =
+            build_cwbvh_from_tris(&copies, BvhBuildParams::fast_build(), &mut std::time::Duration::default());
+        let triangles = bvh
+            .primitive_indices
+            .iter()
+            .map(|&i| (RtTriangle::from(&copies[i as usize]), sources[i as usize]))
+            .collect();
         let [low, high] = mesh.heights();
         Tracer { bvh, triangles, heights: [low - 1e-3, high + 1e-3] }
     }
@@ -68,7 +75,8 @@ impl Tracer {
 
     /// Follows a ray piece by piece until `visit` says that it ends or it leaves the surface's heights.
     fn pieces(&self, mut origin: Vec3A, direction: Vec3A, mut visit: impl FnMut(Ray) -> bool) {
-        // No component may be -0: the tree takes its sign from the comparison with 0 and the sign of its inverse from the bit.
+        // No component may be -0: the tree takes its sign from the comparison with 0 and the sign of its
+        // inverse from the bit.
         let direction = direction + Vec3A::ZERO;
         let level = direction.x.hypot(direction.y);
         let length = if level > 1e-6 { MARGIN / level } else { f32::INFINITY };
@@ -129,7 +137,11 @@ mod tests {
     #[test]
     fn grazing_rays_meet_the_surface_where_they_should() {
         let mut mesh = Mesh::default();
-        mesh.add_height_field(24, |x, y| 0.03 * (x * std::f32::consts::TAU).sin() * (y * std::f32::consts::TAU).cos(), |_, _| Look::default());
+        mesh.add_height_field(
+            24,
+            |x, y| 0.03 * (x * std::f32::consts::TAU).sin() * (y * std::f32::consts::TAU).cos(),
+            |_, _| Look::default(),
+        );
         let tracer = Tracer::new(&mesh);
         for i in 0..500 {
             let (sin, cos) = (i as f32).sin_cos();
@@ -137,20 +149,29 @@ mod tests {
             let (x, y) = ((i as f32 * 0.618).fract(), (i as f32 * 0.414).fract());
             let hit = tracer.seen(x, y, 0.0, view).expect("the surface has no hole");
             let corners = mesh.corners(hit.triangle as usize);
-            let place = corners[0] * hit.weights[0] + corners[1] * hit.weights[1] + corners[2] * hit.weights[2];
+            let place =
+                corners[0] * hit.weights[0] + corners[1] * hit.weights[1] + corners[2] * hit.weights[2];
             let along = (place - vec3a(x, y, 0.0)) - view * ((place.z) / view.z);
-            assert!((along.x - along.x.round()).abs() < 1e-4 && (along.y - along.y.round()).abs() < 1e-4, "{along}");
+            assert!(
+                (along.x - along.x.round()).abs() < 1e-4 && (along.y - along.y.round()).abs() < 1e-4,
+                "{along}"
+            );
         }
     }
     #[test]
     fn every_view_of_the_grids_sees_every_surface() {
         for kind in crate::synth::Mesostructure::all() {
             let tracer = Tracer::new(&kind.mesh(2));
-            for direction in [81, 151].into_iter().flat_map(|count| crate::directions::grid(count).expect("known")) {
+            for direction in
+                [81, 151].into_iter().flat_map(|count| crate::directions::grid(count).expect("known"))
+            {
                 // Among them the corners of cells, and rays along their edges.
                 for i in 0..64 {
                     let (x, y) = ((i % 8) as f32 / 8.0, (i / 8) as f32 / 8.0);
-                    assert!(tracer.seen(x, y, 0.01, direction.as_vec3a()).is_some(), "{kind:?}: nothing at {x}, {y} along {direction}");
+                    assert!(
+                        tracer.seen(x, y, 0.01, direction.as_vec3a()).is_some(),
+                        "{kind:?}: nothing at {x}, {y} along {direction}"
+                    );
                 }
             }
         }

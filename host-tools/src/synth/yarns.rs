@@ -44,11 +44,23 @@ fn add_yarn(mesh: &mut Mesh, random: &mut Random, yarn: &Yarn, shift: Vec2, cent
     let look = |u: f32, angle: f32| {
         let around = twisted(u, angle) / TAU;
         // Between the plies the yarn is darker than its form alone would make it: fibres lie loose there.
-        let shade = (0.72 + 0.28 * ridge(u, angle)) * (1.0 + 0.13 * tones.at(u, around) + 0.16 * fibres.at(u, around));
+        let shade = (0.72 + 0.28 * ridge(u, angle))
+            * (1.0 + 0.13 * tones.at(u, around) + 0.16 * fibres.at(u, around));
         let albedo = Vec3A::from(yarn.colour) * hue * (tone * shade);
-        Look { albedo: albedo.clamp(Vec3A::ZERO, Vec3A::splat(0.85)), specular: Vec3A::splat(0.05) + albedo * 0.1, widths: [0.28, 0.6] }
+        Look {
+            albedo: albedo.clamp(Vec3A::ZERO, Vec3A::splat(0.85)),
+            specular: Vec3A::splat(0.05) + albedo * 0.1,
+            widths: [0.28, 0.6],
+        }
     };
-    mesh.add_tube(&Tube { steps: yarn.steps, shift, turns: yarn.turns, centre, section: &section, look: &look });
+    mesh.add_tube(&Tube {
+        steps: yarn.steps,
+        shift,
+        turns: yarn.turns,
+        centre,
+        section: &section,
+        look: &look,
+    });
 }
 
 /// Adds a level ground that closes the view through gaps.
@@ -56,7 +68,8 @@ fn add_ground(mesh: &mut Mesh, height: f32, steps: usize, look: Look) {
     mesh.add_height_field(steps, |_, _| height, |_, _| look);
 }
 
-/// Height of a yarn on its way over and under others: `over` tells for each crossing, with crossings at half numbers.
+/// Height of a yarn on its way over and under others: `over` tells for each crossing, with crossings at half
+/// numbers.
 fn wave(at: f32, over: impl Fn(i32) -> bool) -> f32 {
     let before = (at - 0.5).floor();
     let t = at - 0.5 - before;
@@ -66,7 +79,15 @@ fn wave(at: f32, over: impl Fn(i32) -> bool) -> f32 {
 }
 
 /// Warp along y and weft along x, `count` of each; `over` tells whether warp `i` lies above weft `j`.
-fn weave(mesh: &mut Mesh, random: &mut Random, count: usize, yarns: [&Yarn; 2], lift: f32, wander: f32, over: impl Fn(i32, i32) -> bool) {
+fn weave(
+    mesh: &mut Mesh,
+    random: &mut Random,
+    count: usize,
+    yarns: [&Yarn; 2],
+    lift: f32,
+    wander: f32,
+    over: impl Fn(i32, i32) -> bool,
+) {
     let spacing = 1.0 / count as f32;
     for (kind, yarn) in yarns.into_iter().enumerate() {
         for i in 0..count {
@@ -89,7 +110,15 @@ fn weave(mesh: &mut Mesh, random: &mut Random, count: usize, yarns: [&Yarn; 2], 
 pub fn tissue(random: &mut Random) -> Mesh {
     const COUNT: usize = 8;
     const RADIUS: f32 = 0.018;
-    let fibre = |colour| Yarn { half: [RADIUS; 2], plies: 3.0, turns: 5.0, depth: 0.12, colour, steps: [COUNT * 24, 20], grain: 24 };
+    let fibre = |colour| Yarn {
+        half: [RADIUS; 2],
+        plies: 3.0,
+        turns: 5.0,
+        depth: 0.12,
+        colour,
+        steps: [COUNT * 24, 20],
+        grain: 24,
+    };
     let mut mesh = Mesh::default();
     add_ground(&mut mesh, -2.1 * RADIUS, 96, Look::glossy([0.05, 0.03, 0.025], [0.02; 3], 0.5));
     let yarns = [&fibre([0.72, 0.6, 0.38]), &fibre([0.62, 0.5, 0.3])];
@@ -101,7 +130,15 @@ pub fn tissue(random: &mut Random) -> Mesh {
 pub fn cloth(random: &mut Random) -> Mesh {
     const COUNT: usize = 12;
     const HALF: [f32; 2] = [0.5 / COUNT as f32, 0.0165];
-    let yarn = |colour, turns| Yarn { half: HALF, plies: 3.0, turns, depth: 0.2, colour, steps: [COUNT * 18, 22], grain: 36 };
+    let yarn = |colour, turns| Yarn {
+        half: HALF,
+        plies: 3.0,
+        turns,
+        depth: 0.2,
+        colour,
+        steps: [COUNT * 18, 22],
+        grain: 36,
+    };
     let mut mesh = Mesh::default();
     add_ground(&mut mesh, -2.1 * HALF[1], 48, Look::glossy([0.03; 3], [0.0; 3], 0.5));
     let yarns = [&yarn([0.42, 0.06, 0.05], 6.0), &yarn([0.66, 0.52, 0.3], 5.0)];
@@ -114,8 +151,15 @@ pub fn knit(random: &mut Random) -> Mesh {
     const WALES: usize = 8;
     const ROWS: usize = 10;
     let width = 1.0 / WALES as f32;
-    let yarn =
-        Yarn { half: [width * 0.135, width * 0.125], plies: 3.0, turns: 25.0, depth: 0.24, colour: [0.16, 0.3, 0.42], steps: [WALES * 52, 18], grain: 80 };
+    let yarn = Yarn {
+        half: [width * 0.135, width * 0.125],
+        plies: 3.0,
+        turns: 25.0,
+        depth: 0.24,
+        colour: [0.16, 0.3, 0.42],
+        steps: [WALES * 52, 18],
+        grain: 80,
+    };
     let mut mesh = Mesh::default();
     add_ground(&mut mesh, -0.31 * width, 64, Look::glossy([0.05, 0.06, 0.07], [0.0; 3], 0.5));
     for row in 0..ROWS {

@@ -1,9 +1,9 @@
 //! The decomposition of Ruiters and Klein (2009, section 4.1), in floats.
 //!
-//! The unfolded tensor is projected into the space of its leading components; K-SVD over texels gives ABRDF atoms, and
-//! K-SVD over their views, each weighted by how much its atom is used, gives light atoms. Where the paper stops, a few
-//! rounds go on: texels are coded again with the atoms as the second step left them, ABRDF atoms solved anew for these
-//! codes, and their fibres coded again.
+//! The unfolded tensor is projected into the space of its leading components; K-SVD over texels gives ABRDF
+//! atoms, and K-SVD over their views, each weighted by how much its atom is used, gives light atoms. Where
+//! the paper stops, a few rounds go on: texels are coded again with the atoms as the second step left them,
+//! ABRDF atoms solved anew for these codes, and their fibres coded again.
 
 use super::ksvd::{Code, Found, Pursuit, Rows, code_all, code_with, first_atoms, gram, iterate, normalise};
 use crate::baseline::pca::Pca;
@@ -65,7 +65,8 @@ pub struct Fit {
     pub fibres: Vec<Vec<(u32, f64)>>,
     /// Largest magnitude of each ABRDF atom's coefficients.
     pub largest: Vec<f64>,
-    /// Squared error of coding texels with 0, 1, 2, ... coefficients, in the data's domain; what the components lose is added.
+    /// Squared error of coding texels with 0, 1, 2, ... coefficients, in the data's domain; what the
+    /// components lose is added.
     pub of_texels: Vec<f64>,
     /// Squared error of coding fibres with 0, 1, 2, ... entries, weighted by use.
     pub of_fibres: Vec<f64>,
@@ -95,20 +96,28 @@ pub fn rebuild(light: &Rows, fibres: &[Vec<(u32, f64)>], atoms: usize) -> Rows {
         let (view, atom) = (n / atoms, n % atoms);
         let target = &mut rebuilt.values[(atom * views + view) * row..][..row];
         for &(index, value) in fibre {
-            target.iter_mut().zip(light.row(index as usize)).for_each(|(t, l)| *t += (value * *l as f64) as f32);
+            target
+                .iter_mut()
+                .zip(light.row(index as usize))
+                .for_each(|(t, l)| *t += (value * *l as f64) as f32);
         }
     }
     rebuilt
 }
 
-/// Fibres of lifted atoms as samples, each times the weight of its atom: `[view * atoms + atom][light][colour]`.
+/// Fibres of lifted atoms as samples, each times the weight of its atom: `[view * atoms +
+/// atom][light][colour]`.
 fn fibre_samples(lifted: &Rows, views: usize, weights: &[f64]) -> Rows {
     let (atoms, row) = (lifted.count(), lifted.dim / views);
     let mut samples = Rows::zeros(views * atoms, row);
     for view in 0..views {
         for (atom, weight) in weights.iter().enumerate() {
             let from = &lifted.row(atom)[view * row..][..row];
-            samples.row_mut(view * atoms + atom).iter_mut().zip(from).for_each(|(to, from)| *to = (weight * *from as f64) as f32);
+            samples
+                .row_mut(view * atoms + atom)
+                .iter_mut()
+                .zip(from)
+                .for_each(|(to, from)| *to = (weight * *from as f64) as f32);
         }
     }
     samples
@@ -117,24 +126,31 @@ fn fibre_samples(lifted: &Rows, views: usize, weights: &[f64]) -> Rows {
 /// Root of the energy of each atom's coefficients.
 fn uses(codes: &[Code], atoms: usize) -> Vec<f64> {
     let mut energy = vec![0.0f64; atoms];
-    codes.iter().flat_map(|code| &code.terms).for_each(|&(atom, value)| energy[atom as usize] += value * value);
+    codes
+        .iter()
+        .flat_map(|code| &code.terms)
+        .for_each(|&(atom, value)| energy[atom as usize] += value * value);
     energy.iter().map(|e| e.sqrt()).collect()
 }
 
-/// The atoms that with given codes come nearest to the samples: one solution of the normal equations for all of them. Nothing if the equations are
-/// singular in the numbers that they are solved in.
+/// The atoms that with given codes come nearest to the samples: one solution of the normal equations for all
+/// of them. Nothing if the equations are singular in the numbers that they are solved in.
 fn solve_atoms(samples: &Rows, codes: &[Code], atoms: usize) -> Option<Rows> {
     let dim = samples.dim;
     let mut normal = vec![0.0f64; atoms * atoms];
     let mut right = vec![0.0f64; atoms * dim];
     for (i, code) in codes.iter().enumerate() {
         for &(a, va) in &code.terms {
-            right[a as usize * dim..][..dim].iter_mut().zip(samples.row(i)).for_each(|(r, s)| *r += va * *s as f64);
+            right[a as usize * dim..][..dim]
+                .iter_mut()
+                .zip(samples.row(i))
+                .for_each(|(r, s)| *r += va * *s as f64);
             code.terms.iter().for_each(|&(b, vb)| normal[a as usize * atoms + b as usize] += va * vb);
         }
     }
     // A millionth of the mean use: what is hardly used stays near zero instead of growing without bound.
-    let ridge = (0..atoms).map(|a| normal[a * atoms + a]).sum::<f64>() / atoms as f64 * 1e-6 + f64::MIN_POSITIVE;
+    let ridge =
+        (0..atoms).map(|a| normal[a * atoms + a]).sum::<f64>() / atoms as f64 * 1e-6 + f64::MIN_POSITIVE;
     let matrix = |a: usize, b: usize| normal[a * atoms + b] + if a == b { ridge } else { 0.0 };
     let solved = solve_symmetric(matrix, &right, atoms)?;
     Some(Rows { dim, values: (0..atoms * dim).map(|i| solved[(i / dim, i % dim)] as f32).collect() })
@@ -187,15 +203,22 @@ pub fn fit(pca: &Pca<'_>, shape: Shape, training: Training, mut tell: impl FnMut
             }
             // Unit length, as K-SVD has them; the codes take what they had.
             let lengths: Vec<f64> = (0..shape.abrdf_atoms).map(|a| normalise(atoms.row_mut(a))).collect();
-            codes.iter_mut().flat_map(|code| &mut code.terms).for_each(|(atom, value)| *value *= lengths[*atom as usize]);
+            codes
+                .iter_mut()
+                .flat_map(|code| &mut code.terms)
+                .for_each(|(atom, value)| *value *= lengths[*atom as usize]);
         }
     }
     trained.breakdowns += codes.iter().chain(&fibre_codes).map(|code| code.breakdowns as u64).sum::<u64>();
     let fibres = unweigh(&fibre_codes, &weights);
     let mut largest = vec![0.0f64; shape.abrdf_atoms];
-    codes.iter().flat_map(|code| &code.terms).for_each(|&(atom, value)| largest[atom as usize] = largest[atom as usize].max(value.abs()));
+    codes
+        .iter()
+        .flat_map(|code| &code.terms)
+        .for_each(|&(atom, value)| largest[atom as usize] = largest[atom as usize].max(value.abs()));
     let used: Vec<f64> = weights.iter().copied().filter(|&w| w > 0.0).collect();
-    trained.condition = used.iter().fold(0.0f64, |m, &w| m.max(w)) / used.iter().fold(f64::MAX, |m, &w| m.min(w)).max(f64::MIN_POSITIVE);
+    trained.condition = used.iter().fold(0.0f64, |m, &w| m.max(w))
+        / used.iter().fold(f64::MAX, |m, &w| m.min(w)).max(f64::MIN_POSITIVE);
     let of_texels = errors(&codes, shape.coefficients).iter().map(|e| e + lost).collect();
     Fit { of_texels, of_fibres: errors(&fibre_codes, shape.entries), light, fibres, largest, trained }
 }
@@ -205,7 +228,11 @@ fn unweigh(codes: &[Code], weights: &[f64]) -> Vec<Vec<(u32, f64)>> {
     let atoms = weights.len();
     let of = |(n, code): (usize, &Code)| {
         let weight = weights[n % atoms];
-        if weight > 0.0 { code.terms.iter().map(|&(index, value)| (index, value / weight)).collect() } else { Vec::new() }
+        if weight > 0.0 {
+            code.terms.iter().map(|&(index, value)| (index, value / weight)).collect()
+        } else {
+            Vec::new()
+        }
     };
     codes.iter().enumerate().map(of).collect()
 }

@@ -1,8 +1,8 @@
 //! Light atoms, fibres and coefficients become the integers of chapter 12.
 //!
-//! Scales chain up so that every number uses its range: a light atom's largest entry is 511 and its scale goes into the
-//! fibres; an ABRDF atom's coefficients fill 16 bits and their scale goes into its fibres too; what remains is a power of
-//! two, which the two shifts of the atom and that of the section take.
+//! Scales chain up so that every number uses its range: a light atom's largest entry is 511 and its scale
+//! goes into the fibres; an ABRDF atom's coefficients fill 16 bits and their scale goes into its fibres too;
+//! what remains is a power of two, which the two shifts of the atom and that of the section take.
 
 use super::ksvd::Rows;
 use crate::model::AtomShifts;
@@ -33,19 +33,28 @@ pub struct Atoms {
 }
 
 impl Atoms {
-    /// From floats: light atoms `[light][channel]`, fibres by view and atom, and the largest coefficient of each ABRDF atom,
-    /// which `value_bits` have to reach.
+    /// From floats: light atoms `[light][channel]`, fibres by view and atom, and the largest coefficient of
+    /// each ABRDF atom, which `value_bits` have to reach.
     pub fn new(light: &Rows, fibres: &[Vec<(u32, f64)>], largest: &[f64], value_bits: u32) -> Atoms {
         let (light_atoms, atoms) = (light.count(), largest.len());
         let views = fibres.len() / atoms;
         let entries = fibres.iter().map(Vec::len).max().unwrap_or(0).max(1);
         let index_bits = bit_length(light_atoms as u32 - 1);
         let step = 1i32 << index_bits;
-        let scales: Vec<f64> =
-            (0..light_atoms).map(|i| light.row(i).iter().fold(0.0f64, |m, &x| m.max(x.abs() as f64)).max(f64::MIN_POSITIVE.sqrt()) / ENTRY).collect();
+        let scales: Vec<f64> = (0..light_atoms)
+            .map(|i| {
+                light.row(i).iter().fold(0.0f64, |m, &x| m.max(x.abs() as f64)).max(f64::MIN_POSITIVE.sqrt())
+                    / ENTRY
+            })
+            .collect();
         let lights_count = light.dim / 3;
-        let quantised = |l: usize, i: usize| std::array::from_fn(|c| (light.row(i)[l * 3 + c] as f64 / scales[i]).round() as i16);
-        let lights: Vec<[i16; 3]> = (0..lights_count).flat_map(|l| (0..light_atoms).map(move |i| (l, i))).map(|(l, i)| quantised(l, i)).collect();
+        let quantised = |l: usize, i: usize| {
+            std::array::from_fn(|c| (light.row(i)[l * 3 + c] as f64 / scales[i]).round() as i16)
+        };
+        let lights: Vec<[i16; 3]> = (0..lights_count)
+            .flat_map(|l| (0..light_atoms).map(move |i| (l, i)))
+            .map(|(l, i)| quantised(l, i))
+            .collect();
 
         let mut result = Atoms {
             light_atoms,
@@ -60,10 +69,19 @@ impl Atoms {
         };
         let top = (1 << 15) - (1 << (15 - value_bits.min(15)));
         for atom in 0..atoms {
-            let of_atom: Vec<Vec<(u32, f64)>> =
-                (0..views).map(|view| fibres[view * atoms + atom].iter().map(|&(index, value)| (index, value * scales[index as usize])).collect()).collect();
+            let of_atom: Vec<Vec<(u32, f64)>> = (0..views)
+                .map(|view| {
+                    fibres[view * atoms + atom]
+                        .iter()
+                        .map(|&(index, value)| (index, value * scales[index as usize]))
+                        .collect()
+                })
+                .collect();
             let most = of_atom.iter().flatten().fold(0.0f64, |m, (_, v)| m.max(v.abs()));
-            let sum = of_atom.iter().map(|fibre| fibre.iter().map(|(_, v)| v.abs()).sum::<f64>()).fold(0.0, f64::max);
+            let sum = of_atom
+                .iter()
+                .map(|fibre| fibre.iter().map(|(_, v)| v.abs()).sum::<f64>())
+                .fold(0.0, f64::max);
             let unit = (largest[atom] / top as f64).max(1e-30);
             result.coefficient_unit[atom] = unit;
             if most <= 0.0 {
@@ -71,7 +89,8 @@ impl Atoms {
                 continue;
             }
             // Rounding to the nearest multiple of the step must stay within the format.
-            let needed = (most / (32_767 - step) as f64).max(sum / (FIBRE_SUM_LIMIT as i32 - entries as i32 * step) as f64);
+            let needed = (most / (32_767 - step) as f64)
+                .max(sum / (FIBRE_SUM_LIMIT as i32 - entries as i32 * step) as f64);
             // Largest q with 2^(-q - 17) / unit >= needed.
             let q = (-(needed * unit).log2() - 17.0).floor() as i32;
             let value_unit = 2f64.powi(-q - 17) / unit;
@@ -86,7 +105,10 @@ impl Atoms {
                 slots.iter_mut().filter(|slot| slot.0 == 0).for_each(|slot| slot.1 = 0);
                 for l in 0..lights_count {
                     for c in 0..3 {
-                        let sum: i64 = slots.iter().map(|&(v, i)| v as i64 * result.lights[l * light_atoms + i as usize][c] as i64).sum();
+                        let sum: i64 = slots
+                            .iter()
+                            .map(|&(v, i)| v as i64 * result.lights[l * light_atoms + i as usize][c] as i64)
+                            .sum();
                         peak = peak.max(sum.unsigned_abs() as f64);
                     }
                 }
@@ -100,9 +122,11 @@ impl Atoms {
         result
     }
 
-    /// ABRDF atoms as the decoder has them at sample directions, but for its last roundings: `[atom][view][light][channel]`.
+    /// ABRDF atoms as the decoder has them at sample directions, but for its last roundings:
+    /// `[atom][view][light][channel]`.
     pub fn rebuild(&self) -> Rows {
-        let (views, lights) = (self.fibres.len() / self.atoms / self.entries, self.lights.len() / self.light_atoms);
+        let (views, lights) =
+            (self.fibres.len() / self.atoms / self.entries, self.lights.len() / self.light_atoms);
         let mut rows = Rows::zeros(self.atoms, views * lights * 3);
         for view in 0..views {
             for atom in 0..self.atoms {
@@ -110,7 +134,12 @@ impl Atoms {
                 let row = &mut rows.row_mut(atom)[view * lights * 3..][..lights * 3];
                 for (light, out) in row.as_chunks_mut::<3>().0.iter_mut().enumerate() {
                     for (c, out) in out.iter_mut().enumerate() {
-                        let sum: i64 = fibre.iter().map(|&(v, i)| v as i64 * self.lights[light * self.light_atoms + i as usize][c] as i64).sum();
+                        let sum: i64 = fibre
+                            .iter()
+                            .map(|&(v, i)| {
+                                v as i64 * self.lights[light * self.light_atoms + i as usize][c] as i64
+                            })
+                            .sum();
                         *out = (sum as f64 * self.value_unit[atom]) as f32;
                     }
                 }
@@ -170,19 +199,26 @@ impl Quantiser<'_> {
         list_coefficient(stored as u32, self.value_bits) as f64 * self.atoms.coefficient_unit[atom as usize]
     }
 
-    /// Shifts of the ABRDF atoms, and of the sections, for lists that are there: gains as small as the bound of 12.5-8 allows.
+    /// Shifts of the ABRDF atoms, and of the sections, for lists that are there: gains as small as the bound
+    /// of 12.5-8 allows.
     pub fn shifts(&self, levels: &[Vec<Vec<(u32, u16)>>]) -> (Vec<AtomShifts>, u32) {
         let least = self.atoms.rest_shift.iter().copied().min().unwrap_or(0).clamp(0, SHIFT_LIMIT);
-        let gain = |atom: usize, shift: i32| (self.atoms.rest_shift[atom] - shift).clamp(0, SHIFT_LIMIT) as u32;
+        let gain =
+            |atom: usize, shift: i32| (self.atoms.rest_shift[atom] - shift).clamp(0, SHIFT_LIMIT) as u32;
         let fits = |shift: i32| {
             levels.iter().flatten().all(|list| {
-                let part =
-                    |&(atom, stored): &(u32, u16)| list_coefficient(stored as u32, self.value_bits).unsigned_abs().div_ceil(1 << gain(atom as usize, shift));
+                let part = |&(atom, stored): &(u32, u16)| {
+                    list_coefficient(stored as u32, self.value_bits)
+                        .unsigned_abs()
+                        .div_ceil(1 << gain(atom as usize, shift))
+                };
                 list.iter().map(part).sum::<u32>() <= LIST_SUM_LIMIT
             })
         };
         let shift = (0..=least).rev().find(|&shift| fits(shift)).unwrap_or(0);
-        let atoms = (0..self.atoms.atoms).map(|atom| AtomShifts { angular: self.atoms.angular_shift[atom], gain: gain(atom, shift) }).collect();
+        let atoms = (0..self.atoms.atoms)
+            .map(|atom| AtomShifts { angular: self.atoms.angular_shift[atom], gain: gain(atom, shift) })
+            .collect();
         (atoms, shift as u32)
     }
 }

@@ -1,16 +1,16 @@
 //! K-SVD (Aharon et al. 2006): a dictionary whose sparse combinations come near given samples.
 //!
-//! Coding is batch orthogonal matching pursuit and the update of an atom one step of the power method instead of
-//! a whole decomposition (both Rubinstein et al. 2008). Everything adds up in a fixed order, so that no bit depends
-//! on the number of threads.
+//! Coding is batch orthogonal matching pursuit and the update of an atom one step of the power method instead
+//! of a whole decomposition (both Rubinstein et al. 2008). Everything adds up in a fixed order, so that no
+//! bit depends on the number of threads.
 
 use crate::linear::{ordered, product_bt};
 use crate::random::Random;
 
 /// Samples coded at once.
 const BATCH: usize = 128;
-/// A pivot below this part of an atom's energy means that the atom lies in the span of those already chosen: it is
-/// left out, and counted.
+/// A pivot below this part of an atom's energy means that the atom lies in the span of those already chosen:
+/// it is left out, and counted.
 const BREAKDOWN: f64 = 1e-7;
 
 /// Rows of numbers, each `dim` long.
@@ -92,8 +92,8 @@ pub struct Code {
     pub breakdowns: u32,
 }
 
-/// Orthogonal matching pursuit by correlations: `alpha` are the sample's products with all atoms, `energy` is that of the
-/// sample, `gram` those of the atoms with each other.
+/// Orthogonal matching pursuit by correlations: `alpha` are the sample's products with all atoms, `energy` is
+/// that of the sample, `gram` those of the atoms with each other.
 pub fn pursue(alpha: &[f32], energy: f64, gram: &[f64], pursuit: Pursuit) -> Code {
     let n = alpha.len();
     let first: Vec<f64> = alpha.iter().map(|&a| a as f64).collect();
@@ -107,7 +107,9 @@ pub fn pursue(alpha: &[f32], energy: f64, gram: &[f64], pursuit: Pursuit) -> Cod
     let mut values: Vec<f64> = Vec::new();
     let mut error = energy;
     while chosen.len() < pursuit.most {
-        let gain = |i: usize| if banned[i] || gram[i * n + i] <= 0.0 { 0.0 } else { now[i] * now[i] / gram[i * n + i] };
+        let gain = |i: usize| {
+            if banned[i] || gram[i * n + i] <= 0.0 { 0.0 } else { now[i] * now[i] / gram[i * n + i] }
+        };
         let mut best = (0, 0.0);
         for i in 0..n {
             let gain = gain(i);
@@ -157,18 +159,29 @@ pub fn code_all(samples: &Rows, atoms: &Rows, pursuit: Pursuit) -> Vec<Code> {
     code_with(samples, atoms, &gram(atoms), pursuit)
 }
 
-/// Codes all samples with products of the atoms that are given: where samples and atoms stand in a subspace, those of the atoms
-/// in the whole space.
+/// Codes all samples with products of the atoms that are given: where samples and atoms stand in a subspace,
+/// those of the atoms in the whole space.
 pub fn code_with(samples: &Rows, atoms: &Rows, gram: &[f64], pursuit: Pursuit) -> Vec<Code> {
     let n = atoms.count();
     let work = |batch: usize| -> Result<Vec<Code>, std::convert::Infallible> {
         let (first, count) = (batch * BATCH, BATCH.min(samples.count() - batch * BATCH));
         let mut alpha = vec![0.0; count * n];
-        product_bt(&mut alpha, &samples.values[first * samples.dim..][..count * samples.dim], &atoms.values, [count, samples.dim, n], false);
-        let of = |i: usize| pursue(&alpha[i * n..][..n], dot(samples.row(first + i), samples.row(first + i)), gram, pursuit);
+        product_bt(
+            &mut alpha,
+            &samples.values[first * samples.dim..][..count * samples.dim],
+            &atoms.values,
+            [count, samples.dim, n],
+            false,
+        );
+        let of = |i: usize| {
+            pursue(&alpha[i * n..][..n], dot(samples.row(first + i), samples.row(first + i)), gram, pursuit)
+        };
         Ok((0..count).map(of).collect())
     };
-    let Ok(codes) = ordered(samples.count().div_ceil(BATCH), work, Vec::new(), |all: &mut Vec<Code>, _, codes| all.extend(codes));
+    let Ok(codes) =
+        ordered(samples.count().div_ceil(BATCH), work, Vec::new(), |all: &mut Vec<Code>, _, codes| {
+            all.extend(codes)
+        });
     codes
 }
 
@@ -183,7 +196,8 @@ pub struct Found {
     pub error: f64,
 }
 
-/// `count` samples, scaled to one, drawn without repetition; unit vectors where there are too few that are not zero.
+/// `count` samples, scaled to one, drawn without repetition; unit vectors where there are too few that are
+/// not zero.
 pub fn first_atoms(samples: &Rows, count: usize, seed: u64) -> Rows {
     let mut random = Random::new(seed);
     let mut order: Vec<usize> = (0..samples.count()).collect();
@@ -214,7 +228,8 @@ pub fn normalise(row: &mut [f32]) -> f64 {
 /// Codes the samples, then turns each atom towards what its samples miss.
 pub fn iterate(samples: &Rows, atoms: &mut Rows, pursuit: Pursuit) -> Found {
     let codes = code_all(samples, atoms, pursuit);
-    let mut found = Found { breakdowns: codes.iter().map(|code| code.breakdowns as u64).sum(), ..Found::default() };
+    let mut found =
+        Found { breakdowns: codes.iter().map(|code| code.breakdowns as u64).sum(), ..Found::default() };
     let dim = samples.dim;
     // What is left of each sample.
     let mut rest = samples.values.clone();
@@ -224,7 +239,10 @@ pub fn iterate(samples: &Rows, atoms: &mut Rows, pursuit: Pursuit) -> Found {
         for &(atom, value) in &code.terms {
             users[atom as usize].push((i as u32, value));
             let atom = atoms.row(atom as usize);
-            rest[i * dim..][..dim].iter_mut().zip(atom).for_each(|(rest, a)| *rest -= (value * *a as f64) as f32);
+            rest[i * dim..][..dim]
+                .iter_mut()
+                .zip(atom)
+                .for_each(|(rest, a)| *rest -= (value * *a as f64) as f32);
         }
         errors.push(code.errors.last().copied().unwrap_or(0.0));
     }
@@ -232,7 +250,10 @@ pub fn iterate(samples: &Rows, atoms: &mut Rows, pursuit: Pursuit) -> Found {
     for (j, users) in users.iter().enumerate() {
         if users.is_empty() {
             // The worst coded sample that no other dead atom has taken.
-            let worst = errors.iter().enumerate().fold((0, 0.0), |worst, (i, &e)| if e > worst.1 { (i, e) } else { worst });
+            let worst = errors
+                .iter()
+                .enumerate()
+                .fold((0, 0.0), |worst, (i, &e)| if e > worst.1 { (i, e) } else { worst });
             if worst.1 > 0.0 {
                 errors[worst.0] = 0.0;
                 atoms.row_mut(j).copy_from_slice(&rest[worst.0 * dim..][..dim]);
@@ -245,7 +266,9 @@ pub fn iterate(samples: &Rows, atoms: &mut Rows, pursuit: Pursuit) -> Found {
         let mut sum = vec![0.0f64; dim];
         for &(i, value) in users {
             let row = &rest[i as usize * dim..][..dim];
-            sum.iter_mut().zip(row.iter().zip(&old)).for_each(|(sum, (r, a))| *sum += value * (*r as f64 + value * *a as f64));
+            sum.iter_mut()
+                .zip(row.iter().zip(&old))
+                .for_each(|(sum, (r, a))| *sum += value * (*r as f64 + value * *a as f64));
         }
         let length = sum.iter().map(|s| s * s).sum::<f64>().sqrt();
         if length <= 0.0 {
@@ -279,7 +302,11 @@ mod tests {
             assert_eq!((code.terms.len(), code.errors.len()), (5, 6));
             assert!(code.errors.windows(2).all(|pair| pair[1] <= pair[0]));
             let mut rest: Vec<f32> = samples.row(i).to_vec();
-            code.terms.iter().for_each(|&(atom, value)| rest.iter_mut().zip(atoms.row(atom as usize)).for_each(|(r, a)| *r -= (value * *a as f64) as f32));
+            code.terms.iter().for_each(|&(atom, value)| {
+                rest.iter_mut()
+                    .zip(atoms.row(atom as usize))
+                    .for_each(|(r, a)| *r -= (value * *a as f64) as f32)
+            });
             // What is left is square to every chosen atom, and as large as was said.
             assert!(code.terms.iter().all(|&(atom, _)| dot(&rest, atoms.row(atom as usize)).abs() < 1e-5));
             assert!((dot(&rest, &rest) - code.errors[5]).abs() < 1e-5 * code.errors[0]);
@@ -288,12 +315,18 @@ mod tests {
 
     #[test]
     fn nearly_parallel_atoms_are_refused_and_counted() {
-        // The second atom is the first and a ten-thousandth of a direction that the sample has: fitting that direction by
-        // their difference would take coefficients of thousands.
+        // The second atom is the first and a ten-thousandth of a direction that the sample has: fitting that
+        // direction by their difference would take coefficients of thousands.
         let mut atoms = random_rows(4, 8, 3);
-        let copy: Vec<f32> = atoms.row(0).iter().enumerate().map(|(i, x)| x + if i % 2 == 0 { 1e-4 } else { -1e-4 }).collect();
+        let copy: Vec<f32> =
+            atoms.row(0).iter().enumerate().map(|(i, x)| x + if i % 2 == 0 { 1e-4 } else { -1e-4 }).collect();
         atoms.row_mut(1).copy_from_slice(&copy);
-        let samples = Rows { dim: 8, values: (0..8).map(|i| atoms.row(0)[i] + 0.1 * atoms.row(2)[i] + if i % 2 == 0 { 0.3 } else { -0.3 }).collect() };
+        let samples = Rows {
+            dim: 8,
+            values: (0..8)
+                .map(|i| atoms.row(0)[i] + 0.1 * atoms.row(2)[i] + if i % 2 == 0 { 0.3 } else { -0.3 })
+                .collect(),
+        };
         let code = &code_all(&samples, &atoms, Pursuit { most: 4, least_gain: 0.0 })[0];
         assert!(code.terms.iter().all(|(_, value)| value.abs() < 10.0), "{code:?}");
         assert!(code.terms.len() == 3 && code.breakdowns == 1, "{code:?}");
@@ -322,6 +355,11 @@ mod tests {
         let first = iterate(&samples, &mut atoms, pursuit);
         assert!(first.revived >= 1);
         let last = (0..40).map(|_| iterate(&samples, &mut atoms, pursuit)).last().expect("some");
-        assert!(last.error < 0.02 * energy && last.error < first.error / 5.0, "{} {} {energy}", last.error, first.error);
+        assert!(
+            last.error < 0.02 * energy && last.error < first.error / 5.0,
+            "{} {} {energy}",
+            last.error,
+            first.error
+        );
     }
 }

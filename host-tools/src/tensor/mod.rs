@@ -1,8 +1,9 @@
 //! The encoder of the sparse tensor (chapter 12): a dataset becomes a file for a goal in bytes or error.
 //!
-//! [`fit`](mod@fit) decomposes in floats as the paper does; [`integers`] turns light atoms and fibres into the numbers of a
-//! file. The texels are then coded against *those* numbers, from the data themselves, so that rounding of the atoms is made
-//! up for as far as coefficients can, and the error is known before anything is decoded.
+//! [`fit`](mod@fit) decomposes in floats as the paper does; [`integers`] turns light atoms and fibres into
+//! the numbers of a file. The texels are then coded against *those* numbers, from the data themselves, so
+//! that rounding of the atoms is made up for as far as coefficients can, and the error is known before
+//! anything is decoded.
 
 pub mod fit;
 pub mod integers;
@@ -27,7 +28,8 @@ use std::f64::consts::LN_2;
 pub enum Goal {
     /// Bytes of the whole file, at most.
     Size(u64),
-    /// Root of the mean squared error in the domain that is coded: of `ln(x + offset)`, or of linear radiance.
+    /// Root of the mean squared error in the domain that is coded: of `ln(x + offset)`, or of linear
+    /// radiance.
     Rms(f64),
     /// As many coefficients as the shape allows, for every texel.
     All,
@@ -71,7 +73,8 @@ pub struct Encoded {
     pub bytes: Vec<u8>,
     /// Coefficients of level 0.
     pub coefficients: usize,
-    /// Predicted root mean squared error over level 0, in the domain that is coded, all rounding of stored numbers included.
+    /// Predicted root mean squared error over level 0, in the domain that is coded, all rounding of stored
+    /// numbers included.
     pub predicted_rms: f64,
     /// Coefficients beyond the range of their ABRDF atom, which were limited to it.
     pub limited: usize,
@@ -83,12 +86,18 @@ impl Encoded {
     /// What training and coding found, in words.
     pub fn found(&self) -> String {
         let Trained { revived, breakdowns, condition, .. } = &self.trained;
-        format!("{revived} atoms revived, {breakdowns} breakdowns, energies of atoms within {condition:.0}:1, {} coefficients limited", self.limited)
+        format!(
+            "{revived} atoms revived, {breakdowns} breakdowns, energies of atoms within {condition:.0}:1, {} coefficients limited",
+            self.limited
+        )
     }
 
     /// Whether any of it is out of the common.
     pub fn is_stiff(&self) -> bool {
-        self.trained.revived > 0 || self.trained.breakdowns > 0 || self.trained.condition > STIFF || are_many(self.limited, self.coefficients)
+        self.trained.revived > 0
+            || self.trained.breakdowns > 0
+            || self.trained.condition > STIFF
+            || are_many(self.limited, self.coefficients)
     }
 }
 
@@ -98,7 +107,9 @@ pub fn transfer_of(data: &Dataset, domain: Domain) -> TransferModel {
     match domain {
         Domain::Log => TransferModel::Log2 { offset: statistics.coded_offset() },
         // Values below 16, so that a texture is far below its bound.
-        Domain::Linear => TransferModel::Linear { exponent: (statistics.largest.max(1e-30).log2().ceil() as i32 - 4).clamp(-60, 60) },
+        Domain::Linear => TransferModel::Linear {
+            exponent: (statistics.largest.max(1e-30).log2().ceil() as i32 - 4).clamp(-60, 60),
+        },
     }
 }
 
@@ -160,7 +171,10 @@ impl Correlations {
                 limited += is_limited as usize;
             }
             list.sort_unstable();
-            let rounded: Vec<(usize, f64)> = list.iter().map(|&(atom, stored)| (atom as usize, quantiser.coefficient(atom, stored))).collect();
+            let rounded: Vec<(usize, f64)> = list
+                .iter()
+                .map(|&(atom, stored)| (atom as usize, quantiser.coefficient(atom, stored)))
+                .collect();
             let mut error = self.energy[texel];
             for &(a, x) in &rounded {
                 error -= 2.0 * x * alpha[a] as f64;
@@ -170,7 +184,8 @@ impl Correlations {
         };
         let of = |texel: usize| {
             let mut best = coded(texel, pursuit);
-            // Nearly parallel atoms get large coefficients that cancel; where these are limited they do not, and fewer come nearer.
+            // Nearly parallel atoms get large coefficients that cancel; where these are limited they do not,
+            // and fewer come nearer.
             if best.2 > 0 {
                 for most in (0..best.0.len()).rev() {
                     let shorter = coded(texel, Pursuit { most, ..pursuit });
@@ -212,15 +227,22 @@ const VALUE_BITS: std::ops::RangeInclusive<u32> = 5..=9;
 ///
 /// # Errors
 /// If the data cannot be read, or the goal cannot be met.
-pub fn encode(pca: &Pca<'_>, coarser: &[&Dataset], options: &Options, tell: impl FnMut(&str, usize, usize)) -> Result<Encoded> {
+pub fn encode(
+    pca: &Pca<'_>,
+    coarser: &[&Dataset],
+    options: &Options,
+    tell: impl FnMut(&str, usize, usize),
+) -> Result<Encoded> {
     let fitted = fit(pca, options.shape, options.training, tell);
     encode_fit(pca, &fitted, coarser, options)
 }
 
-/// Fibres and largest coefficients of the ABRDF atoms, with nothing left of those that are parallel to another one with larger coefficients.
+/// Fibres and largest coefficients of the ABRDF atoms, with nothing left of those that are parallel to
+/// another one with larger coefficients.
 ///
-/// Where one part of the data has nearly all the energy, training makes many atoms of it, which rounding may turn in any order: which of them a
-/// texel is coded with, and how large its coefficient is then, would be chance.
+/// Where one part of the data has nearly all the energy, training makes many atoms of it, which rounding may
+/// turn in any order: which of them a texel is coded with, and how large its coefficient is then, would be
+/// chance.
 fn without_twins(light: &Rows, fitted: &Fit) -> (Vec<Vec<(u32, f64)>>, Vec<f64>) {
     let (mut fibres, mut largest) = (fitted.fibres.clone(), fitted.largest.clone());
     let products = gram(&Atoms::new(light, &fibres, &largest, 8).rebuild());
@@ -229,7 +251,10 @@ fn without_twins(light: &Rows, fitted: &Fit) -> (Vec<Vec<(u32, f64)>>, Vec<f64>)
     order.sort_by(|&a, &b| largest[b].total_cmp(&largest[a]).then(a.cmp(&b)));
     let mut kept: Vec<usize> = Vec::with_capacity(n);
     for atom in order {
-        let is_twin = |&&other: &&usize| products[atom * n + other].abs() > (1.0 - TWINS) * (products[atom * n + atom] * products[other * n + other]).sqrt();
+        let is_twin = |&&other: &&usize| {
+            products[atom * n + other].abs()
+                > (1.0 - TWINS) * (products[atom * n + atom] * products[other * n + other]).sqrt()
+        };
         match kept.iter().find(is_twin) {
             Some(&twin) => {
                 largest[twin] += std::mem::take(&mut largest[atom]);
@@ -279,22 +304,41 @@ pub fn encode_fit(pca: &Pca<'_>, fitted: &Fit, coarser: &[&Dataset], options: &O
     let mut correlations: Option<(Atoms, Vec<f64>, Vec<Correlations>)> = None;
     for value_bits in bits {
         if correlations.is_none() {
-            // Atoms are made for the range of their coefficients; coded anew these move a little, so it is done twice, and where many
-            // are limited, as those of nearly parallel atoms are, again with more room: what errs least is taken.
+            // Atoms are made for the range of their coefficients; coded anew these move a little, so it is
+            // done twice, and where many are limited, as those of nearly parallel atoms are,
+            // again with more room: what errs least is taken.
             let mut least = f64::INFINITY;
             for pass in 0..MOST_PASSES {
                 let atoms = Atoms::new(&light, &fibres, &largest, value_bits.max(8));
                 let rebuilt = atoms.rebuild();
                 let products = gram(&rebuilt);
-                let of_levels = levels.iter().map(|level| correlate(level, &forward, &decoded_means, &rebuilt)).collect::<Result<Vec<_>>>()?;
+                let of_levels = levels
+                    .iter()
+                    .map(|level| correlate(level, &forward, &decoded_means, &rebuilt))
+                    .collect::<Result<Vec<_>>>()?;
                 let quantiser = Quantiser::new(&atoms, 15);
-                let lists = of_levels[0].lists(&products, &quantiser, Pursuit { most: options.shape.coefficients, least_gain: 0.0 });
+                let lists = of_levels[0].lists(
+                    &products,
+                    &quantiser,
+                    Pursuit { most: options.shape.coefficients, least_gain: 0.0 },
+                );
                 let mut seen = vec![0.0f64; largest.len()];
-                let coefficient = |&(atom, stored): &(u32, u16)| (atom as usize, quantiser.coefficient(atom, stored).abs());
-                lists.model.iter().flatten().map(coefficient).for_each(|(atom, c)| seen[atom] = seen[atom].max(c));
-                // Limited ones say that there is more; a little room for what other numbers of coefficients need.
+                let coefficient =
+                    |&(atom, stored): &(u32, u16)| (atom as usize, quantiser.coefficient(atom, stored).abs());
+                lists
+                    .model
+                    .iter()
+                    .flatten()
+                    .map(coefficient)
+                    .for_each(|(atom, c)| seen[atom] = seen[atom].max(c));
+                // Limited ones say that there is more; a little room for what other numbers of coefficients
+                // need.
                 let (room, floor) = if pass == 0 { (1.25, 1e-6) } else { (4.0, 1.0) };
-                largest = largest.iter().zip(&seen).map(|(&was, &now)| if now >= was * 0.999 { was * room } else { now.max(was * floor) }).collect();
+                largest = largest
+                    .iter()
+                    .zip(&seen)
+                    .map(|(&was, &now)| if now >= was * 0.999 { was * room } else { now.max(was * floor) })
+                    .collect();
                 if lists.error < least * if pass == 1 { 1.01 } else { 1.0 } {
                     least = lists.error;
                     correlations = Some((atoms, products, of_levels));
@@ -308,8 +352,10 @@ pub fn encode_fit(pca: &Pca<'_>, fitted: &Fit, coarser: &[&Dataset], options: &O
         let quantiser = Quantiser::new(atoms, value_bits);
         let attempt = |least_gain: f64| -> (MaterialModel, Vec<u8>, Lists) {
             let pursuit = Pursuit { most: options.shape.coefficients, least_gain };
-            let mut lists: Vec<Lists> = of_levels.iter().map(|level| level.lists(products, &quantiser, pursuit)).collect();
-            let per_level: Vec<Vec<Vec<(u32, u16)>>> = lists.iter_mut().map(|lists| std::mem::take(&mut lists.model)).collect();
+            let mut lists: Vec<Lists> =
+                of_levels.iter().map(|level| level.lists(products, &quantiser, pursuit)).collect();
+            let per_level: Vec<Vec<Vec<(u32, u16)>>> =
+                lists.iter_mut().map(|lists| std::mem::take(&mut lists.model)).collect();
             let (shifts, shift) = quantiser.shifts(&per_level);
             let tensor = TensorModel {
                 channels: [true; 3],
@@ -318,11 +364,17 @@ pub fn encode_fit(pca: &Pca<'_>, fitted: &Fit, coarser: &[&Dataset], options: &O
                 entries: atoms.entries(),
                 atoms: shifts,
                 fibres: atoms.fibres(),
-                lists: per_level.into_iter().map(|lists| vec![ListsModel { value_bits, shift, lists }]).collect(),
+                lists: per_level
+                    .into_iter()
+                    .map(|lists| vec![ListsModel { value_bits, shift, lists }])
+                    .collect(),
             };
             let model = MaterialModel {
                 level_count: levels.len() as u32,
-                channels: std::array::from_fn(|c| ChannelModel { mean: Some(tables[c].clone()), ..ChannelModel::default() }),
+                channels: std::array::from_fn(|c| ChannelModel {
+                    mean: Some(tables[c].clone()),
+                    ..ChannelModel::default()
+                }),
                 tensor: Some(tensor),
                 ..described(description, transfer)
             };
@@ -343,7 +395,8 @@ pub fn encode_fit(pca: &Pca<'_>, fitted: &Fit, coarser: &[&Dataset], options: &O
             Goal::Rms(_) if !meets(&found.1, &found.2) => continue,
             _ => {
                 // For a size a higher worth meets it, for an error a lower one does.
-                let (mut low, mut high) = ((energy * 1e-9 + f64::MIN_POSITIVE).ln(), (energy * 10.0 + f64::MIN_POSITIVE).ln());
+                let (mut low, mut high) =
+                    ((energy * 1e-9 + f64::MIN_POSITIVE).ln(), (energy * 10.0 + f64::MIN_POSITIVE).ln());
                 let mut met = None;
                 for _ in 0..14 {
                     let middle = (low + high) / 2.0;
@@ -369,7 +422,14 @@ pub fn encode_fit(pca: &Pca<'_>, fitted: &Fit, coarser: &[&Dataset], options: &O
         let (model, bytes, lists) = found;
         let predicted_rms = (lists.error / values).sqrt() * unit;
         let worth = options.goal.worth(predicted_rms, bytes.len() as f64);
-        let encoded = Encoded { model, bytes, coefficients: lists.count, predicted_rms, limited: lists.limited, trained: fitted.trained };
+        let encoded = Encoded {
+            model,
+            bytes,
+            coefficients: lists.count,
+            predicted_rms,
+            limited: lists.limited,
+            trained: fitted.trained,
+        };
         if best.as_ref().is_none_or(|(least, _)| worth < *least) {
             best = Some((worth, encoded));
         }
@@ -379,7 +439,9 @@ pub fn encode_fit(pca: &Pca<'_>, fitted: &Fit, coarser: &[&Dataset], options: &O
         Goal::Rms(rms) => format!("an error of {rms}"),
         Goal::All => "a file".to_owned(),
     };
-    best.map(|(_, encoded)| encoded).ok_or_else(|| ToolError::Usage(format!("{goal} cannot be reached with these sizes of dictionaries and lists")))
+    best.map(|(_, encoded)| encoded).ok_or_else(|| {
+        ToolError::Usage(format!("{goal} cannot be reached with these sizes of dictionaries and lists"))
+    })
 }
 
 /// Sizes of dictionaries that are tried: light atoms and ABRDF atoms.
@@ -391,11 +453,16 @@ const TRIAL: [usize; 2] = [12, 20];
 fn estimated_bytes(data: &Dataset, levels: usize, shape: Shape) -> u64 {
     let description = data.description();
     let [lights, views] = [&description.lights, &description.views].map(Vec::len);
-    let fixed = 600 + 6 * (lights * views + lights) + 60 * (lights + if description.lights == description.views { 0 } else { views });
-    let texels: usize = (0..levels as u32).map(|level| description.size.iter().map(|&n| n.div_ceil(1 << level)).product::<usize>()).sum();
+    let fixed = 600
+        + 6 * (lights * views + lights)
+        + 60 * (lights + if description.lights == description.views { 0 } else { views });
+    let texels: usize = (0..levels as u32)
+        .map(|level| description.size.iter().map(|&n| n.div_ceil(1 << level)).product::<usize>())
+        .sum();
     let index = (shape.abrdf_atoms as f64 / shape.coefficients as f64).log2().max(0.0) + 2.0;
     let list = (shape.coefficients as f64 * (7.0 + index) + 9.0) / 8.0;
-    (fixed + 4 * lights * shape.light_atoms + 2 * views * shape.abrdf_atoms * shape.entries) as u64 + (texels as f64 * list) as u64
+    (fixed + 4 * lights * shape.light_atoms + 2 * views * shape.abrdf_atoms * shape.entries) as u64
+        + (texels as f64 * list) as u64
 }
 
 /// Errors of shorter fibres and lists of one trial decomposition.
@@ -406,7 +473,8 @@ struct Trial {
     of_fibres: Vec<f64>,
 }
 
-/// What the shape for a goal is chosen by: for some sizes of the dictionaries one decomposition with long fibres and lists. The same for all goals.
+/// What the shape for a goal is chosen by: for some sizes of the dictionaries one decomposition with long
+/// fibres and lists. The same for all goals.
 pub struct Trials<'a, 'd> {
     pca: &'a Pca<'d>,
     trials: Vec<Trial>,
@@ -418,16 +486,18 @@ impl<'a, 'd> Trials<'a, 'd> {
         let training = Training { iterations: training.iterations.min(6), rounds: 1, ..training };
         let trial = |[light_atoms, abrdf_atoms]: [usize; 2]| {
             let [entries, coefficients] = TRIAL;
-            let fitted = fit(pca, Shape { light_atoms, abrdf_atoms, entries, coefficients }, training, &mut tell);
+            let fitted =
+                fit(pca, Shape { light_atoms, abrdf_atoms, entries, coefficients }, training, &mut tell);
             Trial { light_atoms, abrdf_atoms, of_texels: fitted.of_texels, of_fibres: fitted.of_fibres }
         };
         Trials { pca, trials: SIZES.map(trial).into() }
     }
 
-    /// The best shape of each size of the dictionaries for a goal, the best of all first, and the error that is estimated for it.
+    /// The best shape of each size of the dictionaries for a goal, the best of all first, and the error that
+    /// is estimated for it.
     ///
-    /// By the estimate of Ruiters and Klein (section 4.2): errors of shorter fibres and lists are read from a decomposition as sums of those of both
-    /// steps.
+    /// By the estimate of Ruiters and Klein (section 4.2): errors of shorter fibres and lists are read from a
+    /// decomposition as sums of those of both steps.
     fn ranked(&self, levels: usize, goal: Goal) -> Vec<(f64, Shape)> {
         let values = (self.pca.dataset.description().texels() * self.pca.mean.len()) as f64;
         let best_of = |trial: &Trial| {
@@ -453,21 +523,27 @@ impl<'a, 'd> Trials<'a, 'd> {
         };
         let mut all: Vec<(f64, f64, Shape)> = self.trials.iter().filter_map(best_of).collect();
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
-        // The estimate is rough: a little more room, of which the goal takes what it needs. Lists can be shortened to a size, fibres cannot.
+        // The estimate is rough: a little more room, of which the goal takes what it needs. Lists can be
+        // shortened to a size, fibres cannot.
         let roomy = |(_, error, shape): (f64, f64, Shape)| {
             let longer = Shape { entries: shape.entries + 1, ..shape };
             let fits = |size| estimated_bytes(self.pca.dataset, levels, longer) <= size;
-            let entries = if matches!(goal, Goal::Size(size) if !fits(size)) { shape.entries } else { longer.entries };
+            let entries =
+                if matches!(goal, Goal::Size(size) if !fits(size)) { shape.entries } else { longer.entries };
             (error, Shape { entries, coefficients: shape.coefficients + 3, ..shape })
         };
         if all.is_empty() {
-            return vec![(f64::INFINITY, Shape { light_atoms: 64, abrdf_atoms: 128, entries: 8, coefficients: 10 })];
+            return vec![(
+                f64::INFINITY,
+                Shape { light_atoms: 64, abrdf_atoms: 128, entries: 8, coefficients: 10 },
+            )];
         }
         all.into_iter().map(roomy).collect()
     }
 
-    /// Encodes with the shape that is estimated to be best, and with those of other sizes of the dictionaries where the error comes out far from the
-    /// estimate or the goal is not reached, as it may with data whose energy is in a few of their values. Gives the decomposition too.
+    /// Encodes with the shape that is estimated to be best, and with those of other sizes of the dictionaries
+    /// where the error comes out far from the estimate or the goal is not reached, as it may with data
+    /// whose energy is in a few of their values. Gives the decomposition too.
     ///
     /// # Errors
     /// If the data cannot be read, or no shape reaches the goal.
@@ -483,7 +559,12 @@ impl<'a, 'd> Trials<'a, 'd> {
         let mut failed = None;
         for (estimate, shape) in self.ranked(1 + coarser.len(), goal) {
             let fitted = fit(self.pca, shape, training, &mut tell);
-            let encoded = match encode_fit(self.pca, &fitted, coarser, &Options { shape, goal, value_bits, training }) {
+            let encoded = match encode_fit(
+                self.pca,
+                &fitted,
+                coarser,
+                &Options { shape, goal, value_bits, training },
+            ) {
                 Ok(encoded) => encoded,
                 Err(error @ ToolError::Usage(_)) => {
                     failed.get_or_insert(error);
@@ -491,7 +572,8 @@ impl<'a, 'd> Trials<'a, 'd> {
                 }
                 Err(error) => return Err(error),
             };
-            let is_near = matches!(goal, Goal::Rms(_)) || encoded.predicted_rms <= NEAR * estimate && encoded.trained.condition <= STIFF;
+            let is_near = matches!(goal, Goal::Rms(_))
+                || encoded.predicted_rms <= NEAR * estimate && encoded.trained.condition <= STIFF;
             let worth = |encoded: &Encoded| goal.worth(encoded.predicted_rms, encoded.bytes.len() as f64);
             if best.as_ref().is_none_or(|(.., least)| worth(&encoded) < worth(least)) {
                 best = Some((shape, fitted, encoded));
@@ -500,7 +582,9 @@ impl<'a, 'd> Trials<'a, 'd> {
                 break;
             }
         }
-        best.ok_or_else(|| failed.unwrap_or_else(|| ToolError::Usage("no shape of a sparse tensor was tried".into())))
+        best.ok_or_else(|| {
+            failed.unwrap_or_else(|| ToolError::Usage("no shape of a sparse tensor was tried".into()))
+        })
     }
 }
 
@@ -526,8 +610,15 @@ mod tests {
     /// Decoded against the data, in the domain that was coded.
     fn decoded(data: &Dataset, bytes: &[u8], domain: Domain) -> f64 {
         let file = selvedge::open(bytes, &Limits::NONE).unwrap_or_else(|finding| panic!("{finding}"));
-        let metrics =
-            compare(Source::Data(data), Source::File(&file, 0), data.description(), data.statistics().log_offset(), None, &|_, _| ()).expect("compared");
+        let metrics = compare(
+            Source::Data(data),
+            Source::File(&file, 0),
+            data.description(),
+            data.statistics().log_offset(),
+            None,
+            &|_, _| (),
+        )
+        .expect("compared");
         if domain == Domain::Log { metrics.log_rms } else { metrics.linear_rms }
     }
 
@@ -541,10 +632,19 @@ mod tests {
             let found = decoded(&data, &all.bytes, domain);
             // Below the prediction where what would be negative is decoded as zero.
             let lowest = if domain == Domain::Log { 0.97 } else { 0.85 };
-            assert!((lowest..1.03).contains(&(found / all.predicted_rms)), "{domain:?}: {found} {}", all.predicted_rms);
-            assert!(found < 0.5 * components.predicted_rms(0), "{domain:?}: {found} {}", components.predicted_rms(0));
+            assert!(
+                (lowest..1.03).contains(&(found / all.predicted_rms)),
+                "{domain:?}: {found} {}",
+                all.predicted_rms
+            );
+            assert!(
+                found < 0.5 * components.predicted_rms(0),
+                "{domain:?}: {found} {}",
+                components.predicted_rms(0)
+            );
             let size = all.bytes.len() as u64 - 100;
-            let smaller = encode(&components, &[], &options(Goal::Size(size)), |_, _, _| ()).expect("encoded");
+            let smaller =
+                encode(&components, &[], &options(Goal::Size(size)), |_, _, _| ()).expect("encoded");
             assert!(smaller.bytes.len() as u64 <= size && smaller.predicted_rms >= all.predicted_rms * 0.99);
             let rms = all.predicted_rms * 1.2;
             let looser = encode(&components, &[], &options(Goal::Rms(rms)), |_, _, _| ()).expect("encoded");
@@ -570,21 +670,34 @@ mod tests {
             ("constant", [6, 5], 9, 6, |_, _| 0.75),
             ("rank one", [6, 5], 9, 6, |t, i| (1.0 + t as f32 * 0.1) * (0.2 + (i % 11) as f32 * 0.05)),
             ("zeros", [6, 5], 9, 6, |t, i| if (t + i) % 3 == 0 { 0.0 } else { 0.4 }),
-            ("a highlight a million times the rest", [6, 5], 9, 6, |t, i| if t == 7 && i / 3 == 11 { 600.0 } else { 0.0006 + (i % 5) as f32 * 1e-5 }),
+            ("a highlight a million times the rest", [6, 5], 9, 6, |t, i| {
+                if t == 7 && i / 3 == 11 { 600.0 } else { 0.0006 + (i % 5) as f32 * 1e-5 }
+            }),
             ("very small", [6, 5], 9, 6, |t, i| 1e-15 * (1.0 + ((t + i) % 4) as f32)),
         ];
         for (name, size, lights, views, value) in cases {
             let path = folder.path().join("odd.selvset");
-            let description =
-                Description { size, lights: grid[..lights].to_vec(), views: grid[..views].to_vec(), sample: Sample::Float, ..Description::default() };
+            let description = Description {
+                size,
+                lights: grid[..lights].to_vec(),
+                views: grid[..views].to_vec(),
+                sample: Sample::Float,
+                ..Description::default()
+            };
             let data = Dataset::from_fn(&path, description, value).expect("written");
             for domain in [Domain::Log, Domain::Linear] {
                 let components = pca(&data, domain, 8).expect("made");
-                let encoded = encode(&components, &[], &options(Goal::All), |_, _, _| ()).unwrap_or_else(|error| panic!("{name} {domain:?}: {error}"));
+                let encoded = encode(&components, &[], &options(Goal::All), |_, _, _| ())
+                    .unwrap_or_else(|error| panic!("{name} {domain:?}: {error}"));
                 let found = decoded(&data, &encoded.bytes, domain);
-                // A unit of the last place of a channel, which is a millionth of its range, may be lost on the way.
+                // A unit of the last place of a channel, which is a millionth of its range, may be lost on
+                // the way.
                 let range = if domain == Domain::Log { 20.0 } else { data.statistics().largest as f64 };
-                assert!(found <= encoded.predicted_rms * 1.05 + range * 2e-4, "{name} {domain:?}: {found} {}", encoded.predicted_rms);
+                assert!(
+                    found <= encoded.predicted_rms * 1.05 + range * 2e-4,
+                    "{name} {domain:?}: {found} {}",
+                    encoded.predicted_rms
+                );
                 println!("{name}, {domain:?}: {found:.3e}, predicted {:.3e}", encoded.predicted_rms);
             }
         }
@@ -596,7 +709,11 @@ mod tests {
         let data = small(folder.path(), [9, 7]);
         let with = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-            pool.install(|| encode(&pca(&data, Domain::Linear, 8).expect("made"), &[], &options(Goal::All), |_, _, _| ()).expect("encoded").bytes)
+            pool.install(|| {
+                encode(&pca(&data, Domain::Linear, 8).expect("made"), &[], &options(Goal::All), |_, _, _| ())
+                    .expect("encoded")
+                    .bytes
+            })
         };
         assert!(with(1) == with(2) && with(1) == with(3));
     }

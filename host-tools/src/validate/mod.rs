@@ -1,7 +1,8 @@
 //! `validate`: every finding of a file, as the core's own checker tells it, and what is legal but unwise.
 //!
-//! There is no second parser: [`selvedge::open_telling`] is `open` with a sink that goes on. What this module adds is words: severity, hints,
-//! counts, and reports as text, JSON ([`Reports`] is the published schema) and SARIF.
+//! There is no second parser: [`selvedge::open_telling`] is `open` with a sink that goes on. What this module
+//! adds is words: severity, hints, counts, and reports as text, JSON ([`Reports`] is the published schema)
+//! and SARIF.
 
 mod hints;
 mod sarif;
@@ -125,16 +126,22 @@ pub struct Options {
 impl Options {
     /// Severity of a rule or advice.
     fn severity(&self, id: &str, name: &str, usual: Severity) -> Severity {
-        let severity = self.severities.get(id).or_else(|| self.severities.get(name)).copied().unwrap_or(usual);
+        let severity =
+            self.severities.get(id).or_else(|| self.severities.get(name)).copied().unwrap_or(usual);
         if severity == Severity::Warning && self.warnings_as_errors { Severity::Error } else { severity }
     }
 
     /// # Errors
     /// If a severity is given for what is no rule and no advice.
     pub fn check(&self) -> Result<()> {
-        let known = |key: &str| Rule::ALL.iter().any(|r| r.id() == key || r.name() == key) || ADVICE.iter().any(|a| a.id == key || a.name == key);
+        let known = |key: &str| {
+            Rule::ALL.iter().any(|r| r.id() == key || r.name() == key)
+                || ADVICE.iter().any(|a| a.id == key || a.name == key)
+        };
         match self.severities.keys().find(|key| !known(key)) {
-            Some(key) => Err(ToolError::Usage(format!("--severity: `{key}` is no rule that is checked and no advice"))),
+            Some(key) => {
+                Err(ToolError::Usage(format!("--severity: `{key}` is no rule that is checked and no advice")))
+            }
             None => Ok(()),
         }
     }
@@ -220,7 +227,8 @@ pub fn files_of(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
 }
 
 fn folder_files(folder: &Path, all: &mut Vec<PathBuf>) -> Result<()> {
-    let entries: std::io::Result<Vec<_>> = std::fs::read_dir(folder).map_err(ToolError::io(folder))?.collect();
+    let entries: std::io::Result<Vec<_>> =
+        std::fs::read_dir(folder).map_err(ToolError::io(folder))?.collect();
     let mut entries = entries.map_err(ToolError::io(folder))?;
     entries.sort_by_key(std::fs::DirEntry::file_name);
     for entry in entries {
@@ -240,7 +248,12 @@ fn folder_files(folder: &Path, all: &mut Vec<PathBuf>) -> Result<()> {
 ///
 /// # Errors
 /// Those of `each`.
-pub fn validate_files(paths: &[PathBuf], dictionary: Option<&[u8]>, options: &Options, each: &mut dyn FnMut(FileReport) -> Result<()>) -> Result<()> {
+pub fn validate_files(
+    paths: &[PathBuf],
+    dictionary: Option<&[u8]>,
+    options: &Options,
+    each: &mut dyn FnMut(FileReport) -> Result<()>,
+) -> Result<()> {
     let check = |path: &PathBuf| match files::read(path) {
         Ok(bytes) => {
             let own = dictionary.filter(|_| !crate::inspect::is_dictionary(&bytes));
@@ -264,7 +277,10 @@ pub fn text(report: &FileReport) -> String {
     for f in &report.findings {
         let part = if f.part == "dictionary" { " (dictionary)" } else { "" };
         let severity = format!("{:?}", f.severity).to_lowercase();
-        text += &format!("{}{part}: {severity} {} at byte {}: {}; found {} ({:#x})", report.file, f.rule, f.offset, f.expected, f.found, f.found);
+        text += &format!(
+            "{}{part}: {severity} {} at byte {}: {}; found {} ({:#x})",
+            report.file, f.rule, f.offset, f.expected, f.found, f.found
+        );
         if !f.hint.is_empty() {
             text += &format!("; {}", f.hint);
         }

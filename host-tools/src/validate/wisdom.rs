@@ -1,4 +1,5 @@
-//! What is legal but unwise: bytes that nobody needs, directions that nearly fall together, prices that one block sets.
+//! What is legal but unwise: bytes that nobody needs, directions that nearly fall together, prices that one
+//! block sets.
 
 use crate::read::{list, record_coefficients};
 use rayon::prelude::*;
@@ -24,10 +25,21 @@ pub struct Advice {
     pub hint: &'static str,
 }
 
-/// All of them. Offsets: the first atom, dictionary or direction it is about, else the section; found: how many, or as said.
+/// All of them. Offsets: the first atom, dictionary or direction it is about, else the section; found: how
+/// many, or as said.
 pub const ADVICE: [Advice; 6] = [
-    Advice { id: "W1", name: "UnusedAtoms", expected: "every atom is in a record or list", hint: "selvedge trim removes them; found is their number" },
-    Advice { id: "W2", name: "UnusedDictionaries", expected: "every own dictionary is in a record", hint: "selvedge trim removes them; found is their number" },
+    Advice {
+        id: "W1",
+        name: "UnusedAtoms",
+        expected: "every atom is in a record or list",
+        hint: "selvedge trim removes them; found is their number",
+    },
+    Advice {
+        id: "W2",
+        name: "UnusedDictionaries",
+        expected: "every own dictionary is in a record",
+        hint: "selvedge trim removes them; found is their number",
+    },
     Advice {
         id: "W3",
         name: "NearDirections",
@@ -46,7 +58,12 @@ pub const ADVICE: [Advice; 6] = [
         expected: "the largest record costs at most 16 times the mean",
         hint: "one block sets the stated price of all; found is its count",
     },
-    Advice { id: "W6", name: "NoLicence", expected: "the metadata name a licence", hint: "without one nobody may pass the file on" },
+    Advice {
+        id: "W6",
+        name: "NoLicence",
+        expected: "the metadata name a licence",
+        hint: "without one nobody may pass the file on",
+    },
 ];
 
 /// Two directions are nearly one below this distance, Q14: a twentieth of a degree at the centre of the disc.
@@ -76,17 +93,30 @@ pub fn walk(opened: &Selvedge<'_>, tell: &mut dyn FnMut(&Advice, u32, u32)) {
     let is_tensor = material.method == METHOD_SPARSE_TENSOR;
     if is_tensor && material.full_count > 0 && own_dictionary {
         let used = uses_of_tensor(opened);
-        let mut unused = (0u32..).zip(&used).filter(|(_, used)| !**used).map(|(atom, _)| (material.fibres_start + 2 + atom) * 4);
+        let mut unused = (0u32..)
+            .zip(&used)
+            .filter(|(_, used)| !**used)
+            .map(|(atom, _)| (material.fibres_start + 2 + atom) * 4);
         if let Some(first) = unused.next() {
             tell(unused_atoms, first, 1 + unused.count() as u32);
         }
     }
-    let full: Vec<Channel> = material.channels.iter().copied().filter(|channel| channel.state == CHANNEL_FULL && !is_tensor).collect();
+    let full: Vec<Channel> = material
+        .channels
+        .iter()
+        .copied()
+        .filter(|channel| channel.state == CHANNEL_FULL && !is_tensor)
+        .collect();
     let seen: Vec<_> = full.par_iter().map(|channel| uses(opened, *channel)).collect();
     for (channel, (atoms, dictionaries)) in full.iter().zip(seen) {
         // Atoms are always in the material's own file, so a word's number is a fourth of its byte offset.
-        let lists = |k: usize| (channel.atoms_start + word(words, channel.atoms_start + 3 + k as u32 * 2)) * 4;
-        let all = || atoms.iter().enumerate().flat_map(|(k, list)| list.iter().enumerate().map(move |(i, used)| (lists(k) + i as u32 * 8, used)));
+        let lists =
+            |k: usize| (channel.atoms_start + word(words, channel.atoms_start + 3 + k as u32 * 2)) * 4;
+        let all = || {
+            atoms.iter().enumerate().flat_map(|(k, list)| {
+                list.iter().enumerate().map(move |(i, used)| (lists(k) + i as u32 * 8, used))
+            })
+        };
         let mut count_of = |advice: &Advice, found: &mut dyn Iterator<Item = u32>| {
             if let Some(first) = found.next() {
                 tell(advice, first, 1 + found.count() as u32);
@@ -97,12 +127,16 @@ pub fn walk(opened: &Selvedge<'_>, tell: &mut dyn FnMut(&Advice, u32, u32)) {
         count_of(unreached, &mut all().filter(|(_, used)| narrow(used)).map(|(at, _)| at));
         if own_dictionary {
             let heads = |k: usize| (channel.angular_start + 2 + k as u32 * 4) * 4;
-            count_of(unused_dictionaries, &mut dictionaries.iter().enumerate().filter(|(_, used)| !**used).map(|(k, _)| heads(k)));
+            count_of(
+                unused_dictionaries,
+                &mut dictionaries.iter().enumerate().filter(|(_, used)| !**used).map(|(k, _)| heads(k)),
+            );
         }
     }
     prices(opened, dear, tell);
     if opened.metadata().licence.is_empty() {
-        let offset = opened.sections().find(|section| section.kind == METADATA).map_or(0, |section| section.offset);
+        let offset =
+            opened.sections().find(|section| section.kind == METADATA).map_or(0, |section| section.offset);
         tell(no_licence, offset, 0);
     }
 }
@@ -112,7 +146,8 @@ fn uses(opened: &Selvedge<'_>, channel: Channel) -> (Vec<Vec<Use>>, Vec<bool>) {
     let words = opened.words();
     let count = word(words, channel.atoms_start);
     let fresh = Use { count: 0, least: u32::MAX, most: 0 };
-    let mut atoms: Vec<Vec<Use>> = (0..count).map(|k| vec![fresh; word(words, channel.atoms_start + 2 + k * 2) as usize]).collect();
+    let mut atoms: Vec<Vec<Use>> =
+        (0..count).map(|k| vec![fresh; word(words, channel.atoms_start + 2 + k * 2) as usize]).collect();
     let mut dictionaries = vec![false; count as usize];
     each_record(opened, channel, |start, block| {
         let record = read_record(words, start, block);
@@ -121,7 +156,8 @@ fn uses(opened: &Selvedge<'_>, channel: Channel) -> (Vec<Vec<Use>>, Vec<bool>) {
             dictionaries[k] = true;
             record_coefficients(words, record, |position, value| {
                 let (used, value) = (&mut atoms[k][position as usize], value << (16 - record.value_bits));
-                *used = Use { count: used.count + 1, least: used.least.min(value), most: used.most.max(value) };
+                *used =
+                    Use { count: used.count + 1, least: used.least.min(value), most: used.most.max(value) };
             });
         }
     });
@@ -137,7 +173,9 @@ fn uses_of_tensor(opened: &Selvedge<'_>) -> Vec<bool> {
         for layer in 0..header.layer_count {
             let start = lists_start(words, material, level, layer);
             for texel in 0..texels {
-                list(words, start, used.len() as u32, texel).iter().for_each(|&(atom, _)| used[atom as usize] = true);
+                list(words, start, used.len() as u32, texel)
+                    .iter()
+                    .for_each(|&(atom, _)| used[atom as usize] = true);
             }
         }
     }
@@ -148,7 +186,10 @@ fn uses_of_tensor(opened: &Selvedge<'_>) -> Vec<bool> {
 fn each_record(opened: &Selvedge<'_>, channel: Channel, mut walk: impl FnMut(u32, u32)) {
     let (header, material) = (opened.header(), opened.material());
     for level in 0..header.level_count {
-        let blocks: u32 = [header.width, header.height].iter().map(|&size| level_size(size, level).div_ceil(header.edge)).product();
+        let blocks: u32 = [header.width, header.height]
+            .iter()
+            .map(|&size| level_size(size, level).div_ceil(header.edge))
+            .product();
         for layer in 0..header.layer_count {
             let start = coefficients_start(opened.words(), material, channel, level, layer);
             (0..blocks).for_each(|block| walk(start, block));
@@ -165,7 +206,8 @@ fn directions(words: Words<'_>, start: u32, near: &Advice, tell: &mut dyn FnMut(
         })
         .collect();
     for (i, &(x, y)) in points.iter().enumerate() {
-        let close = points[..i].iter().position(|&(a, b)| (x - a).pow(2) + (y - b).pow(2) < NEAR_Q14 * NEAR_Q14);
+        let close =
+            points[..i].iter().position(|&(a, b)| (x - a).pow(2) + (y - b).pow(2) < NEAR_Q14 * NEAR_Q14);
         if let Some(other) = close {
             tell(near, (start + 8 + i as u32 * 2) * 4, other as u32);
         }
@@ -181,7 +223,9 @@ fn prices(opened: &Selvedge<'_>, dear: &Advice, tell: &mut dyn FnMut(&Advice, u3
         if blocks < 16 || largest < 64 {
             continue;
         }
-        let sum: u64 = (0..blocks).map(|block| record_operations(read_record(words, start, block).count, header.edge)).sum();
+        let sum: u64 = (0..blocks)
+            .map(|block| record_operations(read_record(words, start, block).count, header.edge))
+            .sum();
         if record_operations(largest, header.edge) * blocks as u64 > DEAR * sum {
             tell(dear, section.offset, largest);
         }

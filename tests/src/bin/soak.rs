@@ -1,9 +1,12 @@
-//! Runs the bodies of the fuzz targets without a fuzzer: seeds, mutations of them, and random bytes, for a count of executions.
+//! Runs the bodies of the fuzz targets without a fuzzer: seeds, mutations of them, and random bytes, for a
+//! count of executions.
 //!
-//! `soak EXECUTIONS [TARGET...]`; what fails is written beside as `soak-TARGET.bytes` before the panic is told. It has no feedback
-//! from coverage, so it finds less than libFuzzer in the same number of executions; it needs nothing but a stable compiler.
+//! `soak EXECUTIONS [TARGET...]`; what fails is written beside as `soak-TARGET.bytes` before the panic is
+//! told. It has no feedback from coverage, so it finds less than libFuzzer in the same number of executions;
+//! it needs nothing but a stable compiler.
 //!
-//! The heap is watched: reading the files of others may take twice what is given and a constant (`Target::memory` of the targets).
+//! The heap is watched: reading the files of others may take twice what is given and a constant
+//! (`Target::memory` of the targets).
 
 use peak_alloc::PeakAlloc;
 use selvedge_tests::targets::{TARGETS, suite};
@@ -28,7 +31,9 @@ fn mutated(random: &mut Random, seeds: &[Vec<u8>]) -> Vec<u8> {
         match random.range(0, 9) {
             0 => bytes.truncate(at),
             1 => bytes.insert(at, random.word() as u8),
-            _ if at < bytes.len() => bytes[at] = random.pick(&[0, 1, 0x7f, 0x80, 0xff, random.clone().word() as u8]),
+            _ if at < bytes.len() => {
+                bytes[at] = random.pick(&[0, 1, 0x7f, 0x80, 0xff, random.clone().word() as u8])
+            }
             _ => {}
         }
     }
@@ -42,8 +47,11 @@ fn main() {
         std::process::exit(1);
     };
     let names: Vec<String> = arguments.collect();
-    for target in TARGETS.iter().filter(|target| names.is_empty() || names.iter().any(|name| name == target.name)) {
-        let mut seeds: Vec<Vec<u8>> = selvedge_tests::seeds(target.name).into_iter().map(|(_, bytes)| bytes).collect();
+    for target in
+        TARGETS.iter().filter(|target| names.is_empty() || names.iter().any(|name| name == target.name))
+    {
+        let mut seeds: Vec<Vec<u8>> =
+            selvedge_tests::seeds(target.name).into_iter().map(|(_, bytes)| bytes).collect();
         if target.name == "open" {
             seeds.extend(suite().iter().map(|vector| vector.bytes.clone()));
         }
@@ -69,6 +77,10 @@ fn main() {
                 std::process::exit(3);
             }
         }
-        println!("{}: {executions} executions of {} seeds, nothing found; heap at most {most} bytes beyond twice the input", target.name, seeds.len());
+        println!(
+            "{}: {executions} executions of {} seeds, nothing found; heap at most {most} bytes beyond twice the input",
+            target.name,
+            seeds.len()
+        );
     }
 }

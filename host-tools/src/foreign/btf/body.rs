@@ -35,7 +35,8 @@ pub(super) struct Factor {
 pub(super) struct View {
     components: usize,
     width: Width,
-    /// Rows `[light][channel]` with the means of each, if texels are on disk as plain rows; else rows of lights alone.
+    /// Rows `[light][channel]` with the means of each, if texels are on disk as plain rows; else rows of
+    /// lights alone.
     lights: Vec<f32>,
     means: Option<Vec<f32>>,
     /// Where the rows of texels begin; and their means, where these belong to `[texel][channel]`.
@@ -84,7 +85,13 @@ fn read_factor(cursor: &mut Cursor<'_>, head: &Head, channels: usize) -> Result<
     let usual = rows == head.pairs() * channels && columns == head.texels();
     let transposed = rows == head.texels() * channels && columns == head.pairs();
     if !usual && !transposed {
-        let due = format!("{} x {} or {} x {}", head.pairs() * channels, head.texels(), head.texels() * channels, head.pairs());
+        let due = format!(
+            "{} x {} or {} x {}",
+            head.pairs() * channels,
+            head.texels(),
+            head.texels() * channels,
+            head.pairs()
+        );
         return cursor.fail(8, format!("a factorisation of {rows} x {columns} where {due} are due"));
     }
     let wide = components as u64;
@@ -110,10 +117,15 @@ pub(super) fn read_decorrelated(cursor: &mut Cursor<'_>, head: &mut Head) -> Res
     if head.channels.len() == 1 && model != Model::Rgb {
         return cursor.bytes.fail(at, format!("colour model {number} of a single channel"));
     }
-    let factors = (0..head.channels.len()).map(|_| read_factor(cursor, head, 1)).collect::<Result<Vec<_>>>()?;
+    let factors =
+        (0..head.channels.len()).map(|_| read_factor(cursor, head, 1)).collect::<Result<Vec<_>>>()?;
     let components: Vec<String> = factors.iter().map(|factor| factor.components.to_string()).collect();
     let name = model.name();
-    head.layout = format!("factorised by channel, {} components, {}, colour model {number} ({name})", components.join(" + "), bits(factors[0].width));
+    head.layout = format!(
+        "factorised by channel, {} components, {}, colour model {number} ({name})",
+        components.join(" + "),
+        bits(factors[0].width)
+    );
     Ok(Body::Full { factors, model })
 }
 
@@ -127,7 +139,9 @@ pub(super) fn read_full(cursor: &mut Cursor<'_>, head: &mut Head, is_log: bool) 
 
 pub(super) fn read_views(cursor: &mut Cursor<'_>, head: &mut Head, slots: u32) -> Result<Body> {
     if slots as usize != head.views.len() {
-        return cursor.bytes.fail(cursor.at, format!("{slots} factorisations of views, where {} are due", head.views.len()));
+        return cursor
+            .bytes
+            .fail(cursor.at, format!("{slots} factorisations of views, where {} are due", head.views.len()));
     }
     let (lights, texels, channels) = (head.lights.len(), head.texels(), head.channels.len());
     let mut views = Vec::with_capacity(slots as usize);
@@ -170,8 +184,16 @@ pub(super) fn read_store(cursor: &mut Cursor<'_>, head: &mut Head) -> Result<Bod
     let compression = cursor.u8("compression")?;
     match compression {
         0 | 2 => {}
-        1 => return cursor.fail(1, "BDIF06R2! with chunks compressed by bzip2 is not read; store it uncompressed (0 or 2)"),
-        _ => return cursor.fail(1, format!("compression {compression} of BDIF06R2! is not known; 0 and 2 are read")),
+        1 => {
+            return cursor.fail(
+                1,
+                "BDIF06R2! with chunks compressed by bzip2 is not read; store it uncompressed (0 or 2)",
+            );
+        }
+        _ => {
+            return cursor
+                .fail(1, format!("compression {compression} of BDIF06R2! is not known; 0 and 2 are read"));
+        }
     }
     let [width, height] = head.size;
     let start = cursor.at;
@@ -201,7 +223,11 @@ pub(super) fn read_store(cursor: &mut Cursor<'_>, head: &mut Head) -> Result<Bod
         left -= left.min(chunk_texels);
     }
     let missing = mask.iter().filter(|&&m| m == 0).count();
-    let absent = if missing > 0 { format!(", {missing} texels masked out{}", if is_sparse { " and absent (black)" } else { "" }) } else { String::new() };
+    let absent = if missing > 0 {
+        format!(", {missing} texels masked out{}", if is_sparse { " and absent (black)" } else { "" })
+    } else {
+        String::new()
+    };
     head.layout = format!("every value, binary16, chunks of {lines} lines{absent}");
     Ok(Body::Store(Store { mask: is_sparse.then_some(mask), before, chunks, chunk_texels }))
 }
@@ -210,17 +236,29 @@ impl Body {
     /// Where the numbers of a texel begin in the file; of several tables, in the first.
     pub(super) fn offset(&self, head: &Head, texel: usize) -> u64 {
         match self {
-            Body::Full { factors, .. } => factors[0].texels + (texel * factors[0].texel_rows * factors[0].components) as u64 * factors[0].width as u64,
+            Body::Full { factors, .. } => {
+                factors[0].texels
+                    + (texel * factors[0].texel_rows * factors[0].components) as u64 * factors[0].width as u64
+            }
             Body::Views(views) => {
                 let rows = if views[0].means.is_some() { 1 } else { head.channels.len() };
                 views[0].texels + (texel * rows * views[0].components) as u64 * views[0].width as u64
             }
-            Body::Store(store) => store.place(head, texel).unwrap_or(store.chunks.first().copied().unwrap_or(0)),
+            Body::Store(store) => {
+                store.place(head, texel).unwrap_or(store.chunks.first().copied().unwrap_or(0))
+            }
         }
     }
 
     /// Decodes a run of texels in one row of the file.
-    pub(super) fn texels(&self, bytes: &Bytes, head: &Head, first: usize, count: usize, values: &mut [f32]) -> Result<()> {
+    pub(super) fn texels(
+        &self,
+        bytes: &Bytes,
+        head: &Head,
+        first: usize,
+        count: usize,
+        values: &mut [f32],
+    ) -> Result<()> {
         match self {
             Body::Full { factors, model } => {
                 full(bytes, head, factors, first, count, values)?;
@@ -235,13 +273,21 @@ impl Body {
     }
 }
 
-fn full(bytes: &Bytes, head: &Head, factors: &[Factor], first: usize, count: usize, values: &mut [f32]) -> Result<()> {
+fn full(
+    bytes: &Bytes,
+    head: &Head,
+    factors: &[Factor],
+    first: usize,
+    count: usize,
+    values: &mut [f32],
+) -> Result<()> {
     let (pairs, channels) = (head.pairs(), head.channels.len());
     let mut plane = Vec::new();
     for (channel, factor) in factors.iter().enumerate() {
         let Factor { components, width, texels, texel_rows, pair_rows, .. } = *factor;
         let row = (texel_rows * components) as u64;
-        let of_texels = bytes.numbers(texels + first as u64 * row * width as u64, count as u64 * row, width)?;
+        let of_texels =
+            bytes.numbers(texels + first as u64 * row * width as u64, count as u64 * row, width)?;
         // Rows of the product: `[texel][pair]` of one channel, or with the channel behind either.
         let (rows, columns) = (count * texel_rows, pairs * pair_rows);
         if pair_rows == 3 {
@@ -252,7 +298,9 @@ fn full(bytes: &Bytes, head: &Head, factors: &[Factor], first: usize, count: usi
         product_bt(&mut plane, &of_texels, &factor.pairs, [rows, components, columns], false);
         for (row, numbers) in plane.chunks(columns).enumerate() {
             let (texel, channel) = if texel_rows == 3 { (row / 3, row % 3) } else { (row, channel) };
-            for (rgb, &number) in values[texel * pairs * 3..][..pairs * 3].as_chunks_mut::<3>().0.iter_mut().zip(numbers) {
+            for (rgb, &number) in
+                values[texel * pairs * 3..][..pairs * 3].as_chunks_mut::<3>().0.iter_mut().zip(numbers)
+            {
                 if channels == 1 { *rgb = [number; 3] } else { rgb[channel] = number }
             }
         }
@@ -260,21 +308,34 @@ fn full(bytes: &Bytes, head: &Head, factors: &[Factor], first: usize, count: usi
     Ok(())
 }
 
-fn of_views(bytes: &Bytes, head: &Head, views: &[View], first: usize, count: usize, values: &mut [f32]) -> Result<()> {
+fn of_views(
+    bytes: &Bytes,
+    head: &Head,
+    views: &[View],
+    first: usize,
+    count: usize,
+    values: &mut [f32],
+) -> Result<()> {
     let (lights, channels, length) = (head.lights.len(), head.channels.len(), head.pairs() * 3);
     let mut plane = Vec::new();
     for (v, view) in views.iter().enumerate() {
         let View { components, width, texels, texel_means, .. } = *view;
-        // Rows of texels, `[texel]` and then columns `[light][channel]`; or rows `[texel][channel]` and columns `[light]`.
+        // Rows of texels, `[texel]` and then columns `[light][channel]`; or rows `[texel][channel]` and
+        // columns `[light]`.
         let texel_rows = if view.means.is_some() { 1 } else { channels };
         let row = (texel_rows * components) as u64;
-        let of_texels = bytes.numbers(texels + first as u64 * row * width as u64, count as u64 * row, width)?;
+        let of_texels =
+            bytes.numbers(texels + first as u64 * row * width as u64, count as u64 * row, width)?;
         let (rows, columns) = (count * texel_rows, lights * channels / texel_rows);
         plane.clear();
         match &view.means {
             Some(means) => (0..rows).for_each(|_| plane.extend_from_slice(means)),
             None => {
-                let means = bytes.numbers(texel_means + (first * channels * width as usize) as u64, rows as u64, width)?;
+                let means = bytes.numbers(
+                    texel_means + (first * channels * width as usize) as u64,
+                    rows as u64,
+                    width,
+                )?;
                 means.iter().for_each(|&mean| plane.extend(std::iter::repeat_n(mean, columns)));
             }
         }
@@ -282,10 +343,19 @@ fn of_views(bytes: &Bytes, head: &Head, views: &[View], first: usize, count: usi
             product_bt(&mut plane, &of_texels, &view.lights, [rows, components, columns], true);
         }
         for texel in 0..count {
-            for (light, rgb) in values[texel * length + v * lights * 3..][..lights * 3].as_chunks_mut::<3>().0.iter_mut().enumerate() {
+            for (light, rgb) in values[texel * length + v * lights * 3..][..lights * 3]
+                .as_chunks_mut::<3>()
+                .0
+                .iter_mut()
+                .enumerate()
+            {
                 *rgb = std::array::from_fn(|c| {
                     let c = c.min(channels - 1);
-                    if texel_rows == 1 { plane[texel * columns + light * channels + c] } else { plane[(texel * channels + c) * columns + light] }
+                    if texel_rows == 1 {
+                        plane[texel * columns + light * channels + c]
+                    } else {
+                        plane[(texel * channels + c) * columns + light]
+                    }
                 });
             }
         }
@@ -301,11 +371,19 @@ impl Store {
         let in_row = (row * head.size[0]..texel).filter(|&before| is_there(before)).count() as u64;
         let index = self.before[row] as u64 + in_row;
         let length = (head.pairs() * head.channels.len() * 2) as u64;
-        is_there(texel).then(|| self.chunks[(index / self.chunk_texels) as usize] + index % self.chunk_texels * length)
+        is_there(texel)
+            .then(|| self.chunks[(index / self.chunk_texels) as usize] + index % self.chunk_texels * length)
     }
 }
 
-fn stored(bytes: &Bytes, head: &Head, store: &Store, first: usize, count: usize, values: &mut [f32]) -> Result<()> {
+fn stored(
+    bytes: &Bytes,
+    head: &Head,
+    store: &Store,
+    first: usize,
+    count: usize,
+    values: &mut [f32],
+) -> Result<()> {
     let (channels, length) = (head.channels.len(), head.pairs() * 3);
     for (texel, out) in (first..first + count).zip(values.chunks_mut(length)) {
         let Some(at) = store.place(head, texel) else {
@@ -313,7 +391,11 @@ fn stored(bytes: &Bytes, head: &Head, store: &Store, first: usize, count: usize,
             continue;
         };
         let numbers = bytes.numbers(at, (head.pairs() * channels) as u64, Width::Half)?;
-        out.as_chunks_mut::<3>().0.iter_mut().zip(numbers.chunks(channels)).for_each(|(rgb, n)| *rgb = std::array::from_fn(|c| n[c.min(channels - 1)]));
+        out.as_chunks_mut::<3>()
+            .0
+            .iter_mut()
+            .zip(numbers.chunks(channels))
+            .for_each(|(rgb, n)| *rgb = std::array::from_fn(|c| n[c.min(channels - 1)]));
     }
     Ok(())
 }

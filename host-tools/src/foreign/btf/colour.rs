@@ -54,8 +54,16 @@ impl Model {
             11 => Model::LogYRatioUv,
             12 => Model::LogRgb,
             2 => return Err("colour model 2 (CIE Lab) is not read: its white point is in no file".into()),
-            5 | 6 => return Err(format!("colour model {number} (spectral) is not read: a material here has three colours")),
-            _ => return Err(format!("colour model {number} is not known; 0, 1, 3, 4, 9, 10, 11 and 12 are read")),
+            5 | 6 => {
+                return Err(format!(
+                    "colour model {number} (spectral) is not read: a material here has three colours"
+                ));
+            }
+            _ => {
+                return Err(format!(
+                    "colour model {number} is not known; 0, 1, 3, 4, 9, 10, 11 and 12 are read"
+                ));
+            }
         })
     }
 
@@ -78,7 +86,9 @@ impl Model {
         match self {
             Model::Rgb => v,
             Model::Yuv => times(&YUV, v),
-            Model::Pca { matrix, mean } => std::array::from_fn(|c| v[0] * matrix[c] + v[1] * matrix[3 + c] + v[2] * matrix[6 + c] + mean[c]),
+            Model::Pca { matrix, mean } => std::array::from_fn(|c| {
+                v[0] * matrix[c] + v[1] * matrix[3 + c] + v[2] * matrix[6 + c] + mean[c]
+            }),
             Model::YCoCg => times(&YCOCG, v),
             Model::LogYUv => times(&YUV, [unlog(v[0]), v[1], v[2]]),
             Model::LogYLogUv => {

@@ -9,17 +9,23 @@
 //!
 //! The layouts are documented nowhere but in their readers, which differ. What is done here:
 //!
-//! * **Rows.** Row 0 of a factor is the top row of the picture, as Bonn's own library has it (cgbonn/btflib, which also makes such files of pictures).
-//!   The C++ reader (zeroeffects/btf) turns rows, for pictures that begin at the bottom.
+//! * **Rows.** Row 0 of a factor is the top row of the picture, as Bonn's own library has it (cgbonn/btflib,
+//!   which also makes such files of pictures). The C++ reader (zeroeffects/btf) turns rows, for pictures that
+//!   begin at the bottom.
 //! * **Model 11.** `U = u (Y + e)`, as btflib has it; `btf.hh` computes `u Y + e` and cuts RGB at 1.
-//! * **Directions.** The light list stands once for each view; the first counts and the others must be of its length.
-//! * **Arrangement.** Factors may have pairs of directions as rows (usual), or texels (btflib alone reads those).
-//! * **Channels.** Three are R, G and B by their names; others are spectral and refused. A single one is grey.
-//! * **Rotations** are a frame for each texel, or none. Values stay in the frames they have, as in both readers; frames that are not the identity are told.
+//! * **Directions.** The light list stands once for each view; the first counts and the others must be of its
+//!   length.
+//! * **Arrangement.** Factors may have pairs of directions as rows (usual), or texels (btflib alone reads
+//!   those).
+//! * **Channels.** Three are R, G and B by their names; others are spectral and refused. A single one is
+//!   grey.
+//! * **Rotations** are a frame for each texel, or none. Values stay in the frames they have, as in both
+//!   readers; frames that are not the identity are told.
 //! * **Negative values**, which factorisations of dark materials have, become zero and are counted.
 //!
-//! No size is trusted: every table is known to be inside the file before anything is held for it. The side of a factorisation that belongs to directions
-//! is held, in binary32; the side of the texels is read row by row, so a material that unfolds to 20 GB is never in memory.
+//! No size is trusted: every table is known to be inside the file before anything is held for it. The side of
+//! a factorisation that belongs to directions is held, in binary32; the side of the texels is read row by
+//! row, so a material that unfolds to 20 GB is never in memory.
 
 mod body;
 pub mod colour;
@@ -34,7 +40,8 @@ use serde::Serialize;
 use std::path::Path;
 
 /// Signatures, the longest of a family first.
-const SIGNATURES: [&str; 7] = ["!DFMF08FCR", "!FMF12FCER", "!FMF06FCR", "!FMF06FC", "!PVF06FCR", "!PVF06FC", "!BDIF06R2!"];
+const SIGNATURES: [&str; 7] =
+    ["!DFMF08FCR", "!FMF12FCER", "!FMF06FCR", "!FMF06FC", "!PVF06FCR", "!PVF06FC", "!BDIF06R2!"];
 /// In place of the meta block's length: the older layout of `PVF`.
 const OLD_VIEWS: u32 = 301_074;
 /// Most channels whose names are read.
@@ -99,7 +106,8 @@ impl Btf {
     /// Opens a file and checks its head and the place of every table.
     ///
     /// # Errors
-    /// With the byte offset, if the file is not as its layout says or is of a variant that is not read, which is named.
+    /// With the byte offset, if the file is not as its layout says or is of a variant that is not read, which
+    /// is named.
     pub fn open(path: &Path) -> Result<Btf> {
         Btf::read(Bytes::open(path)?)
     }
@@ -111,9 +119,13 @@ impl Btf {
     pub fn read(bytes: Bytes) -> Result<Btf> {
         let mut start = vec![0; 12.min(bytes.length()) as usize];
         bytes.read_at(0, &mut start)?;
-        let Some(signature) = SIGNATURES.into_iter().find(|signature| start.starts_with(signature.as_bytes())) else {
-            let shown: String = String::from_utf8_lossy(&start).chars().take_while(|c| c.is_ascii_graphic()).collect();
-            return bytes.fail(0, format!("the format {shown:?} is not read; known are {}", SIGNATURES.join(", ")));
+        let Some(signature) =
+            SIGNATURES.into_iter().find(|signature| start.starts_with(signature.as_bytes()))
+        else {
+            let shown: String =
+                String::from_utf8_lossy(&start).chars().take_while(|c| c.is_ascii_graphic()).collect();
+            return bytes
+                .fail(0, format!("the format {shown:?} is not read; known are {}", SIGNATURES.join(", ")));
         };
         let mut head = Head { signature, ..Head::default() };
         let mut cursor = Cursor { bytes: &bytes, at: signature.len() as u64 };
@@ -170,7 +182,8 @@ impl Btf {
         ((1 << 22) / self.texel_len()).clamp(1, 256).min(self.head.size[0] * self.head.size[1])
     }
 
-    /// Decodes `count` texels, `[texel][view][light][colour]`, from texel `first` on; rows from the top. Values may be negative or not finite.
+    /// Decodes `count` texels, `[texel][view][light][colour]`, from texel `first` on; rows from the top.
+    /// Values may be negative or not finite.
     ///
     /// # Errors
     /// If a number of the file is not finite, and on I/O.
@@ -179,7 +192,13 @@ impl Btf {
         let mut done = 0;
         while done < count {
             let run = (width - (first + done) % width).min(count - done);
-            self.body.texels(&self.bytes, &self.head, first + done, run, &mut values[done * length..][..run * length])?;
+            self.body.texels(
+                &self.bytes,
+                &self.head,
+                first + done,
+                run,
+                &mut values[done * length..][..run * length],
+            )?;
             done += run;
         }
         Ok(())
@@ -240,7 +259,9 @@ fn read_meta(cursor: &mut Cursor<'_>, head: &mut Head) -> Result<()> {
         }
     }
     if cursor.at != start + length as u64 {
-        return cursor.bytes.fail(start, format!("a meta block of {length} bytes; its fields take {}", cursor.at - start));
+        return cursor
+            .bytes
+            .fail(start, format!("a meta block of {length} bytes; its fields take {}", cursor.at - start));
     }
     let is_rgb = head.channels.iter().map(|name| name.to_ascii_uppercase()).eq(["R", "G", "B"]);
     if head.channels.len() != 1 && !is_rgb {
@@ -289,7 +310,8 @@ fn read_direction(cursor: &mut Cursor<'_>, what: &str) -> Result<DVec3> {
     let (sin, cos) = polar.sin_cos();
     // A right angle in binary32 is a little more than one.
     if polar.abs() > 7.0 || cos < -1e-4 {
-        return cursor.fail(8, format!("a {what} direction {polar} radians from the normal is below the surface"));
+        return cursor
+            .fail(8, format!("a {what} direction {polar} radians from the normal is below the surface"));
     }
     let direction = DVec3::new(sin * azimuth.cos(), sin * azimuth.sin(), cos.max(0.0));
     Ok(direction.normalize())
@@ -298,7 +320,10 @@ fn read_direction(cursor: &mut Cursor<'_>, what: &str) -> Result<DVec3> {
 fn read_size(cursor: &mut Cursor<'_>, head: &mut Head) -> Result<()> {
     let size = [cursor.u32("width")?, cursor.u32("height")?];
     if size.iter().any(|n| !(1..=MOST_TEXELS as u32).contains(n)) {
-        return cursor.fail(8, format!("{} x {} texels; 1 to {MOST_TEXELS} along an axis are possible", size[0], size[1]));
+        return cursor.fail(
+            8,
+            format!("{} x {} texels; 1 to {MOST_TEXELS} along an axis are possible", size[0], size[1]),
+        );
     }
     head.size = size.map(|n| n as usize);
     Ok(())
@@ -311,8 +336,11 @@ fn read_rotations(cursor: &mut Cursor<'_>, head: &mut Head) -> Result<()> {
     const PART: u32 = 1024;
     for first in (0..head.rotations).step_by(PART as usize) {
         let count = PART.min(head.rotations - first);
-        let numbers = cursor.bytes.numbers(start + first as u64 * 36, count as u64 * 9, super::bytes::Width::Single)?;
-        let is_identity = |frame: &[f32]| frame.iter().enumerate().all(|(i, n)| (n - if i % 4 == 0 { 1.0 } else { 0.0 }).abs() < 1e-4);
+        let numbers =
+            cursor.bytes.numbers(start + first as u64 * 36, count as u64 * 9, super::bytes::Width::Single)?;
+        let is_identity = |frame: &[f32]| {
+            frame.iter().enumerate().all(|(i, n)| (n - if i % 4 == 0 { 1.0 } else { 0.0 }).abs() < 1e-4)
+        };
         head.rotated += numbers.chunks(9).filter(|frame| !is_identity(frame)).count() as u32;
     }
     Ok(())
@@ -322,13 +350,15 @@ fn read_rotations(cursor: &mut Cursor<'_>, head: &mut Head) -> Result<()> {
 fn read_extension(cursor: &mut Cursor<'_>, head: &mut Head, heights: &mut u64) -> Result<bool> {
     let version = cursor.u8("version of the extension")?;
     if version > 2 {
-        return cursor.fail(1, format!("version {version} of the extension of FMF12FCER; 0, 1 and 2 are known"));
+        return cursor
+            .fail(1, format!("version {version} of the extension of FMF12FCER; 0, 1 and 2 are known"));
     }
     let is_log = version >= 1 && cursor.u32("reduction of the dynamic range")? != 0;
     if version >= 2 {
         let size = [cursor.u32("width of the height map")?, cursor.u32("height of the height map")?];
         if size[0] != 0 && size[1] != 0 {
-            *heights = cursor.table(size[0] as u64, size[1] as u64, super::bytes::Width::Half, "height map")?;
+            *heights =
+                cursor.table(size[0] as u64, size[1] as u64, super::bytes::Width::Half, "height map")?;
             head.height_map = Some(size);
         }
     }

@@ -1,7 +1,9 @@
-//! A dataset as `!FMF06FC`, the plainest factorisation of the `.btf` family, which other people's readers open.
+//! A dataset as `!FMF06FC`, the plainest factorisation of the `.btf` family, which other people's readers
+//! open.
 //!
-//! The mean over the texels is the first component, the principal components of what is left follow: the best approximation of that rank but for the
-//! first column, which is not orthogonal to the others. No reader needs it to be.
+//! The mean over the texels is the first component, the principal components of what is left follow: the best
+//! approximation of that rank but for the first column, which is not orthogonal to the others. No reader
+//! needs it to be.
 
 use super::SIGNATURES;
 use crate::baseline::pca::{Domain, pca};
@@ -43,7 +45,9 @@ fn head(description: &Description) -> Vec<u8> {
     let mut bytes = SIGNATURES[3].as_bytes().to_vec();
     bytes.extend((meta.len() as u32 + 4).to_le_bytes());
     bytes.extend(meta);
-    let angles = |direction: DVec3| to_degrees(direction).into_iter().flat_map(|angle| (angle.to_radians() as f32).to_le_bytes());
+    let angles = |direction: DVec3| {
+        to_degrees(direction).into_iter().flat_map(|angle| (angle.to_radians() as f32).to_le_bytes())
+    };
     bytes.extend((description.views.len() as u32).to_le_bytes());
     for &view in &description.views {
         bytes.extend(angles(view));
@@ -54,7 +58,8 @@ fn head(description: &Description) -> Vec<u8> {
     bytes
 }
 
-/// Writes the first `components` of a dataset in binary32 (fewer if it has no more); returns the RMS error of linear radiance that they leave.
+/// Writes the first `components` of a dataset in binary32 (fewer if it has no more); returns the RMS error of
+/// linear radiance that they leave.
 ///
 /// # Errors
 /// If the data cannot be read or the file cannot be written.
@@ -77,7 +82,12 @@ pub fn export(dataset: &Dataset, path: &Path, components: usize) -> Result<f64> 
     [columns, rows, width * height].iter().for_each(|&n| bytes.extend((n as u32).to_le_bytes()));
     let number = |bytes: &mut Vec<u8>, n: f64| bytes.extend((n as f32).to_le_bytes());
     number(&mut bytes, length * ((width * height) as f64).sqrt());
-    (0..rank).for_each(|i| number(&mut bytes, of_texels.iter().skip(i).step_by(rank).map(|&n| f64::from(n).powi(2)).sum::<f64>().sqrt()));
+    (0..rank).for_each(|i| {
+        number(
+            &mut bytes,
+            of_texels.iter().skip(i).step_by(rank).map(|&n| f64::from(n).powi(2)).sum::<f64>().sqrt(),
+        )
+    });
     for (row, mean) in of_pairs.chunks(rank).zip(mean) {
         number(&mut bytes, f64::from(*mean) / scale);
         row.iter().for_each(|n| bytes.extend(n.to_le_bytes()));
