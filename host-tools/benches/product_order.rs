@@ -11,7 +11,7 @@
 //! * `flat`: `M(M(M(c, u12), u3), u4)`, one sum.
 
 use selvedge::fixed::{multiply_q15, round_shift};
-use selvedge_tools::random::Random;
+use selvedge_tools::math::random::Random;
 use std::hint::black_box;
 use std::time::Instant;
 use wgpu::util::DeviceExt as _;

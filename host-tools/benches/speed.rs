@@ -5,12 +5,13 @@
 //! With `SELVEDGE_DATA` the full 400 x 400 material is measured, without it the excerpt in the repository.
 
 use selvedge::{Direction, FilteredQuery, Limits, Rgb};
-use selvedge_tools::dataset::{Dataset, Sample};
-use selvedge_tools::encode::{Goal, Options, encode, prepare};
-use selvedge_tools::model::{MaterialModel, TransferModel};
-use selvedge_tools::random::Random;
+use selvedge_tools::data::dataset::{Dataset, Sample};
+use selvedge_tools::format::model::{MaterialModel, TransferModel};
+use selvedge_tools::format::write;
+use selvedge_tools::math::random::Random;
+use selvedge_tools::methods::sparse_ensemble::encode::{Goal, Options, encode, prepare};
+use selvedge_tools::methods::sparse_ensemble::sparsebtf;
 use selvedge_tools::synth::{Mesostructure, Request, synthesise};
-use selvedge_tools::{sparsebtf, write};
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
 use std::time::Instant;

@@ -9,13 +9,13 @@
 
 use selvedge::position::axis_at_position;
 use selvedge::{Direction, FilteredQuery, Limits, Rgb, Taps};
-use selvedge_tools::baseline::pca::{Domain, pca};
-use selvedge_tools::dataset::{Dataset, Sample};
-use selvedge_tools::model::MaterialModel;
-use selvedge_tools::random::Random;
+use selvedge_tools::data::dataset::{Dataset, Sample};
+use selvedge_tools::format::model::MaterialModel;
+use selvedge_tools::math::random::Random;
+use selvedge_tools::measure::baseline::pca::{Domain, pca};
+use selvedge_tools::methods::sparse_tensor::encode::fit::{Shape, Training};
+use selvedge_tools::methods::sparse_tensor::encode::{Goal, Options, encode};
 use selvedge_tools::synth::{Mesostructure, Request, synthesise};
-use selvedge_tools::tensor::fit::{Shape, Training};
-use selvedge_tools::tensor::{Goal, Options, encode};
 use std::hint::black_box;
 use std::time::Instant;
 

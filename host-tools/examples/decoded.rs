@@ -6,10 +6,10 @@
 //! on values that come from real coefficients.
 
 use selvedge::{Limits, Rgb};
-use selvedge_tools::dataset::{Dataset, Description, Sample, Writer};
+use selvedge_tools::data::dataset::{Dataset, Description, Sample, Writer};
 use selvedge_tools::error::{Result, ToolError};
 use selvedge_tools::files;
-use selvedge_tools::measure::{describe, query};
+use selvedge_tools::measure::compare::{describe, query};
 use std::path::Path;
 
 fn main() -> Result<()> {

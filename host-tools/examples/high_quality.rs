@@ -10,12 +10,12 @@
 //! material's own bases free of charge.
 
 use selvedge::Limits;
-use selvedge_tools::dataset::Dataset;
-use selvedge_tools::encode::candidates::{Keep, collect};
-use selvedge_tools::encode::{Goal, Options, encode, prepare};
+use selvedge_tools::data::dataset::Dataset;
 use selvedge_tools::error::{Result, ToolError};
-use selvedge_tools::measure::{Source, compare_every};
-use selvedge_tools::model::TransferModel;
+use selvedge_tools::format::model::TransferModel;
+use selvedge_tools::measure::compare::{Source, compare_every};
+use selvedge_tools::methods::sparse_ensemble::encode::candidates::{Keep, collect};
+use selvedge_tools::methods::sparse_ensemble::encode::{Goal, Options, encode, prepare};
 use std::path::Path;
 
 /// Texels along the side of a block in the published layout.

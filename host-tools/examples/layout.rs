@@ -7,13 +7,13 @@
 use selvedge::ensemble::{LOW_BITS_BITS, SHIFT_BITS};
 use selvedge::ensemble_set::LOW_BITS_LIMIT;
 use selvedge::{Limits, directory};
-use selvedge_tools::baseline::pca::{self, Choice};
-use selvedge_tools::baseline::published::Published;
-use selvedge_tools::dataset::Dataset;
-use selvedge_tools::encode::{Encoded, Goal, Options, encode, prepare};
+use selvedge_tools::data::dataset::Dataset;
 use selvedge_tools::error::{Result, ToolError};
-use selvedge_tools::measure::{Metrics, Source, compare};
-use selvedge_tools::model::TransferModel;
+use selvedge_tools::format::model::TransferModel;
+use selvedge_tools::measure::baseline::pca::{self, Choice};
+use selvedge_tools::measure::baseline::published::Published;
+use selvedge_tools::measure::compare::{Metrics, Source, compare};
+use selvedge_tools::methods::sparse_ensemble::encode::{Encoded, Goal, Options, encode, prepare};
 use std::path::Path;
 
 /// Edges of blocks that are tried.

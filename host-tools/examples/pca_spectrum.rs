@@ -5,10 +5,10 @@
 //! It holds the whole matrix of logarithms and the products between its rows in memory (12 bytes for each
 //! pair of texels, 4 for each value of the data).
 
-use selvedge_tools::dataset::Dataset;
+use selvedge_tools::data::dataset::Dataset;
+use selvedge_tools::data::transfer::log2;
 use selvedge_tools::error::{Result, ToolError};
-use selvedge_tools::linear::product_bt;
-use selvedge_tools::transfer::log2;
+use selvedge_tools::math::linear::product_bt;
 use std::f32::consts::LN_2;
 use std::path::Path;
 

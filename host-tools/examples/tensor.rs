@@ -7,12 +7,12 @@
 //! fewest bytes of principal components at 8 or 16 bits for the same error.
 
 use selvedge::Limits;
-use selvedge_tools::baseline::pca::{Domain, pca};
-use selvedge_tools::dataset::Dataset;
+use selvedge_tools::data::dataset::Dataset;
 use selvedge_tools::error::{Result, ToolError};
-use selvedge_tools::measure::{Source, compare};
-use selvedge_tools::tensor::fit::{Shape, Training, fit};
-use selvedge_tools::tensor::{Goal, Options, encode_fit};
+use selvedge_tools::measure::baseline::pca::{Domain, pca};
+use selvedge_tools::measure::compare::{Source, compare};
+use selvedge_tools::methods::sparse_tensor::encode::fit::{Shape, Training, fit};
+use selvedge_tools::methods::sparse_tensor::encode::{Goal, Options, encode_fit};
 use std::path::Path;
 use std::time::Instant;
 

@@ -5,7 +5,7 @@
 //! them, and what is expected is computed from those in binary64 by the formulas of the formats.
 
 use half::f16;
-use selvedge_tools::random::Random;
+use selvedge_tools::math::random::Random;
 
 /// A `.btf` of the tests and what its values are.
 pub struct Written {

@@ -5,20 +5,22 @@
 
 use selvedge::batch::FilteredQuery;
 use selvedge::{Direction, Finding, First, Limits, Part, Rgb, Selvedge};
-use selvedge_tools::count;
+use selvedge_tools::check::count;
+use selvedge_tools::check::extreme::{Reach, extreme_model_from, extreme_tensor_from};
+use selvedge_tools::check::vectors::{Answer, Vector};
+use selvedge_tools::data::dataset::Dataset;
 use selvedge_tools::error::ToolError;
-use selvedge_tools::extreme::{Reach, extreme_model_from, extreme_tensor_from};
 use selvedge_tools::foreign::ImportOptions;
 use selvedge_tools::foreign::archive::Archive;
 use selvedge_tools::foreign::btf::Btf;
 use selvedge_tools::foreign::bytes::Bytes;
 use selvedge_tools::foreign::images::{self, ImageSet};
 use selvedge_tools::foreign::pixels::{self, Colours};
-use selvedge_tools::random::Random;
-use selvedge_tools::read::{model_of, same_triangles};
-use selvedge_tools::vectors::{Answer, Vector};
-use selvedge_tools::write::{lay_out, repair_checksums, take_apart, write_material, write_split};
-use selvedge_tools::{dataset::Dataset, dictionary_file, sparsebtf};
+use selvedge_tools::format::read::{model_of, same_triangles};
+use selvedge_tools::format::write::{lay_out, repair_checksums, take_apart, write_material, write_split};
+use selvedge_tools::math::random::Random;
+use selvedge_tools::methods::sparse_ensemble::dictionary_file;
+use selvedge_tools::methods::sparse_ensemble::sparsebtf;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
@@ -54,7 +56,7 @@ pub fn suite() -> &'static [Vector] {
     static SUITE: OnceLock<Vec<Vector>> = OnceLock::new();
     SUITE.get_or_init(|| {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../spec/vectors");
-        selvedge_tools::vectors::read(&folder).expect("the suite of the repository")
+        selvedge_tools::check::vectors::read(&folder).expect("the suite of the repository")
     })
 }
 
@@ -106,7 +108,7 @@ pub fn open_and_sample(file: &[u8], dictionary: Option<&[u8]>) -> bool {
         Err(finding) => {
             check_finding(finding, file, dictionary);
             // A dictionary is legal by itself and no material.
-            let is_dictionary = selvedge_tools::inspect::is_dictionary(file);
+            let is_dictionary = selvedge_tools::format::info::is_dictionary(file);
             assert!(is_dictionary || first.0 == Some(finding), "{finding}");
             false
         }

@@ -5,11 +5,11 @@
 //! counted, not timed.
 
 use selvedge::{Direction, Limits, Rule, Selvedge};
-use selvedge_tools::count;
-use selvedge_tools::example::example_model;
-use selvedge_tools::model::{ChannelModel, MaterialModel, PairTableModel};
-use selvedge_tools::random::Random;
-use selvedge_tools::write::{repair_checksums, take_apart, write_material, write_split};
+use selvedge_tools::check::count;
+use selvedge_tools::check::example::example_model;
+use selvedge_tools::format::model::{ChannelModel, MaterialModel, PairTableModel};
+use selvedge_tools::format::write::{repair_checksums, take_apart, write_material, write_split};
+use selvedge_tools::math::random::Random;
 
 fn set_word(file: &mut [u8], at: usize, value: u32) {
     file[at..at + 4].copy_from_slice(&value.to_le_bytes());
@@ -133,7 +133,7 @@ fn an_enormous_dictionary() {
 #[test]
 fn many_layers_of_full_records() {
     for seed in 0..400 {
-        let file = write_material(&selvedge_tools::extreme::extreme_of_any_method(seed));
+        let file = write_material(&selvedge_tools::check::extreme::extreme_of_any_method(seed));
         let material = selvedge::open(&file, &Limits::NONE).expect("legal");
         if material.header().layer_count == 8 {
             dearest(&material);

@@ -4,16 +4,16 @@ use proptest::prelude::*;
 use selvedge::interpolation::{VALUE_BOUND, filtered_values};
 use selvedge::{Direction, Limits, Selvedge, Values};
 use selvedge_tests::setting;
-use selvedge_tools::blend::{Blend, Report, blend};
-use selvedge_tools::extreme::extreme_model;
-use selvedge_tools::model::{
+use selvedge_tools::check::extreme::extreme_model;
+use selvedge_tools::format::model::{
     AtomModel, DictionaryModel, EnsembleModel, FactorModel, MaterialModel, TransferModel,
 };
-use selvedge_tools::quantise::{FloatRecord, quantise};
-use selvedge_tools::random::Random;
-use selvedge_tools::read::read_model;
-use selvedge_tools::trim::{Keep, Trim, trim};
-use selvedge_tools::write::write_material;
+use selvedge_tools::format::read::read_model;
+use selvedge_tools::format::trim::{Keep, Trim, trim};
+use selvedge_tools::format::write::write_material;
+use selvedge_tools::math::random::Random;
+use selvedge_tools::methods::sparse_ensemble::blend::{Blend, Report, blend};
+use selvedge_tools::methods::sparse_ensemble::quantise::{FloatRecord, quantise};
 use std::path::Path;
 
 fn excerpt() -> MaterialModel {
@@ -105,8 +105,8 @@ fn varied(model: &MaterialModel, random: &mut Random) -> MaterialModel {
 /// scales.
 fn exact_bound(models: [&MaterialModel; 3], channel: usize) -> f64 {
     let of_ensemble = |ensemble: &EnsembleModel| {
-        let of_layer = |layer: &selvedge_tools::model::CoefficientsModel| {
-            let of_record = |record: &selvedge_tools::model::RecordModel| {
+        let of_layer = |layer: &selvedge_tools::format::model::CoefficientsModel| {
+            let of_record = |record: &selvedge_tools::format::model::RecordModel| {
                 let atoms = &ensemble.atoms[record.dictionary as usize];
                 let parts = record
                     .coefficients

@@ -143,13 +143,17 @@ fn damaged_foreign_files_are_refused() {
     for name in names {
         std::fs::copy(excerpt_folder().join(name), folder.path().join(name)).expect("copy");
     }
-    let mut random = selvedge_tools::random::Random::new(4);
+    let mut random = selvedge_tools::math::random::Random::new(4);
     for name in names {
         let path = folder.path().join(name);
         let bytes = std::fs::read(&path).expect("file");
         for cut in [0, 1, 7, bytes.len() / 2, bytes.len() - 1] {
             std::fs::write(&path, &bytes[..cut]).expect("write");
-            let result = selvedge_tools::sparsebtf::read_material(folder.path(), "carpet07", None);
+            let result = selvedge_tools::methods::sparse_ensemble::sparsebtf::read_material(
+                folder.path(),
+                "carpet07",
+                None,
+            );
             assert!(result.is_err(), "{name} cut to {cut}");
         }
         for _ in 0..12 {
@@ -159,11 +163,18 @@ fn damaged_foreign_files_are_refused() {
                 damaged[at] = random.word() as u8;
             }
             std::fs::write(&path, &damaged).expect("write");
-            if let Ok(model) = selvedge_tools::sparsebtf::read_material(folder.path(), "carpet07", None)
-                .and_then(|m| m.to_model(8))
+            if let Ok(model) = selvedge_tools::methods::sparse_ensemble::sparsebtf::read_material(
+                folder.path(),
+                "carpet07",
+                None,
+            )
+            .and_then(|m| m.to_model(8))
             {
-                selvedge::open(&selvedge_tools::write::write_material(&model), &selvedge::Limits::NONE)
-                    .expect("what is written is legal");
+                selvedge::open(
+                    &selvedge_tools::format::write::write_material(&model),
+                    &selvedge::Limits::NONE,
+                )
+                .expect("what is written is legal");
             }
         }
         std::fs::write(&path, &bytes).expect("write");

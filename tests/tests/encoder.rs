@@ -3,16 +3,17 @@
 
 use glam::DVec3;
 use selvedge::{Limits, Selvedge};
-use selvedge_tools::dataset::{Dataset, Description, Sample, Writer};
-use selvedge_tools::dictionary_file::{self, Training};
-use selvedge_tools::directions;
-use selvedge_tools::encode::driver::{Verified, Wish, encode_verified};
-use selvedge_tools::encode::{Goal, Options, encode, prepare};
-use selvedge_tools::measure::{Metrics, Source, compare};
-use selvedge_tools::model::{MetadataModel, TransferModel};
-use selvedge_tools::random::Random;
-use selvedge_tools::train::{self, train};
-use selvedge_tools::{pyramid, write};
+use selvedge_tools::data::dataset::{Dataset, Description, Sample, Writer};
+use selvedge_tools::data::directions;
+use selvedge_tools::data::pyramid;
+use selvedge_tools::format::model::{MetadataModel, TransferModel};
+use selvedge_tools::format::write;
+use selvedge_tools::math::random::Random;
+use selvedge_tools::measure::compare::{Metrics, Source, compare};
+use selvedge_tools::methods::sparse_ensemble::dictionary_file::{self, Training};
+use selvedge_tools::methods::sparse_ensemble::encode::driver::{Verified, Wish, encode_verified};
+use selvedge_tools::methods::sparse_ensemble::encode::{Goal, Options, encode, prepare};
+use selvedge_tools::methods::sparse_ensemble::train::{self, train};
 use std::path::Path;
 
 /// A small material with texture, relief and a highlight, of any size and number of directions.

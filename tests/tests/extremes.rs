@@ -5,12 +5,12 @@ use selvedge::direction::hull_start;
 use selvedge::ensemble::{coefficients_start, read_record};
 use selvedge::words::word;
 use selvedge::{Direction, Limits, Selvedge};
-use selvedge_tools::extreme::{extreme_model, extreme_tensor};
-use selvedge_tools::model::{
+use selvedge_tools::check::extreme::{extreme_model, extreme_tensor};
+use selvedge_tools::format::model::{
     AtomModel, CoefficientsModel, FactorModel, MaterialModel, RecordModel, TransferModel,
 };
-use selvedge_tools::random::Random;
-use selvedge_tools::write::{write_material, write_split};
+use selvedge_tools::format::write::{write_material, write_split};
+use selvedge_tools::math::random::Random;
 use std::collections::BTreeSet;
 
 /// What must be reached. Words behind a colon are values.
@@ -220,7 +220,7 @@ fn of_model(model: &MaterialModel, seen: &mut BTreeSet<String>) {
 
 /// What a sparse tensor has and its samples reach.
 fn of_tensor(
-    tensor: &selvedge_tools::model::TensorModel,
+    tensor: &selvedge_tools::format::model::TensorModel,
     material: &Selvedge<'_>,
     seen: &mut BTreeSet<String>,
 ) {
@@ -386,8 +386,8 @@ fn of_samples(material: &Selvedge<'_>, seen: &mut BTreeSet<String>, seed: u64) {
 
 /// Files that no random number would make.
 fn made() -> Vec<MaterialModel> {
-    let example = selvedge_tools::example::example_model;
-    let ensemble_of = |edit: &dyn Fn(&mut selvedge_tools::model::EnsembleModel)| {
+    let example = selvedge_tools::check::example::example_model;
+    let ensemble_of = |edit: &dyn Fn(&mut selvedge_tools::format::model::EnsembleModel)| {
         let mut model = example();
         edit(model.channels[0].ensemble.as_mut().expect("full"));
         model

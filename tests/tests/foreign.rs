@@ -4,8 +4,8 @@
 use selvedge_tests::foreign::{LIGHTS, VIEWS, Written, btf_variants, radiance, zip};
 use selvedge_tests::program;
 use selvedge_tests::targets::{archive, btf, image_pixels};
-use selvedge_tools::dataset::{Dataset, Description, Sample, Writer};
-use selvedge_tools::directions::{from_degrees, grid};
+use selvedge_tools::data::dataset::{Dataset, Description, Sample, Writer};
+use selvedge_tools::data::directions::{from_degrees, grid};
 use selvedge_tools::foreign::btf::{Btf, write};
 use selvedge_tools::foreign::bytes::Bytes;
 use selvedge_tools::foreign::images::{self, ImageSet};

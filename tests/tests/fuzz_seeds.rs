@@ -2,7 +2,7 @@
 
 use selvedge_tests::targets::{self, TARGETS};
 use selvedge_tests::{seeds, setting};
-use selvedge_tools::random::Random;
+use selvedge_tools::math::random::Random;
 use std::path::Path;
 
 #[test]

@@ -5,16 +5,19 @@
 
 use selvedge::{Direction, Limits, Selvedge};
 use selvedge_tests::{excerpt_folder, full_data_folder, setting};
-use selvedge_tools::extreme::extreme_of_any_method;
-use selvedge_tools::gpu::{Answer, Gpu, Query, answer_on_cpu, direction_words, random_query};
-use selvedge_tools::random::Random;
-use selvedge_tools::{example, gpu, sparsebtf, write};
+use selvedge_tools::check::example;
+use selvedge_tools::check::extreme::extreme_of_any_method;
+use selvedge_tools::format::write;
+use selvedge_tools::gpu::runner;
+use selvedge_tools::gpu::runner::{Answer, Gpu, Query, answer_on_cpu, direction_words, random_query};
+use selvedge_tools::math::random::Random;
+use selvedge_tools::methods::sparse_ensemble::sparsebtf;
 
 const ENTRIES: [&str; 4] = ["texel", "filtered", "trilinear", "floats"];
 const EXTREME_FILES: u64 = 160;
 
 fn adapter(backends: &str) -> Option<Gpu> {
-    let gpu = Gpu::new(gpu::backends(backends)).expect("the device is created once there is an adapter");
+    let gpu = Gpu::new(runner::backends(backends)).expect("the device is created once there is an adapter");
     match &gpu {
         Some(gpu) => println!("{backends}: {}", gpu.description),
         None => {
@@ -52,8 +55,10 @@ fn extreme_files() -> Vec<(Vec<u8>, Vec<u8>)> {
         }
     };
     let suite = selvedge_tests::targets::suite();
-    let of_suite =
-        suite.iter().filter(|v| matches!(v.answer, selvedge_tools::vectors::Answer::Digest(_))).map(|v| {
+    let of_suite = suite
+        .iter()
+        .filter(|v| matches!(v.answer, selvedge_tools::check::vectors::Answer::Digest(_)))
+        .map(|v| {
             let dictionary = v.dictionary.as_ref().and_then(|path| suite.iter().find(|d| d.path == *path));
             (v.bytes.clone(), dictionary.map_or(Vec::new(), |d| d.bytes.clone()))
         });

@@ -3,10 +3,10 @@
 use proptest::prelude::*;
 use selvedge::batch::FilteredQuery;
 use selvedge::{Direction, Limits, Rgb, Selvedge};
-use selvedge_tools::example::example_model;
-use selvedge_tools::extreme::extreme_of_any_method;
-use selvedge_tools::random::Random;
-use selvedge_tools::write::{write_material, write_split};
+use selvedge_tools::check::example::example_model;
+use selvedge_tools::check::extreme::extreme_of_any_method;
+use selvedge_tools::format::write::{write_material, write_split};
+use selvedge_tools::math::random::Random;
 
 fn direction(random: &mut Random) -> Direction {
     Direction {
@@ -124,7 +124,7 @@ proptest! {
         let model = extreme_of_any_method(seed);
         let file = write_material(&model);
         let material = selvedge::open(&file, &Limits::NONE).expect("legal");
-        let triangles = selvedge_tools::triangulate::triangulate(&model.lights, None).triangles;
+        let triangles = selvedge_tools::format::triangulate::triangulate(&model.lights, None).triangles;
         let mut random = Random::new(seed);
         for _ in 0..100 {
             let asked = direction(&mut random);
@@ -154,7 +154,7 @@ proptest! {
     #[test]
     fn decoding_and_encoding_is_the_identity(seed in 0u64..1_000_000) {
         let file = write_material(&extreme_of_any_method(seed));
-        let back = selvedge_tools::read::read_model(&file, None, &Limits::NONE).expect("legal");
+        let back = selvedge_tools::format::read::read_model(&file, None, &Limits::NONE).expect("legal");
         prop_assert!(write_material(&back) == file);
     }
 }
@@ -188,7 +188,7 @@ fn the_place_on_the_hull_is_the_nearest() {
         let model = extreme_of_any_method(seed);
         let file = write_material(&model);
         let material = selvedge::open(&file, &Limits::NONE).expect("legal");
-        let triangulation = selvedge_tools::triangulate::triangulate(&model.lights, None);
+        let triangulation = selvedge_tools::format::triangulate::triangulate(&model.lights, None);
         let mut random = Random::new(seed);
         for _ in 0..200 {
             let asked = direction(&mut random);

@@ -3,10 +3,12 @@
 
 use selvedge::{Direction, Limits};
 use selvedge_tests::{excerpt_folder, full_data_folder};
-use selvedge_tools::demo::{VALUE_BITS, channel_error};
-use selvedge_tools::gpu::{Gpu, Query, backends};
-use selvedge_tools::random::Random;
-use selvedge_tools::{sparsebtf, triangulate, write};
+use selvedge_tools::format::triangulate;
+use selvedge_tools::format::write;
+use selvedge_tools::gpu::runner::{Gpu, Query, backends};
+use selvedge_tools::math::random::Random;
+use selvedge_tools::methods::sparse_ensemble::sparsebtf;
+use selvedge_tools::show::demo::{VALUE_BITS, channel_error};
 use std::f64::consts::LN_2;
 
 /// Natural logarithm of a Q20 value.

@@ -1,7 +1,7 @@
 //! Specification, conformance table, code and example agree.
 
 use selvedge::Rule;
-use selvedge_tools::example::{example_model, hex_dump, tensor_example_model};
+use selvedge_tools::check::example::{example_model, hex_dump, tensor_example_model};
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -109,7 +109,7 @@ fn the_conformance_table_has_a_row_for_every_rule() {
 fn the_worked_example_is_what_the_writer_makes() {
     let spec = read("spec/selvedge-1.md");
     for (fence, model) in [("```hex", example_model()), ("```hex tensor", tensor_example_model())] {
-        let file = selvedge_tools::write::write_material(&model);
+        let file = selvedge_tools::format::write::write_material(&model);
         let mut shown = BTreeSet::new();
         let mut inside = false;
         for line in spec.lines() {
@@ -136,12 +136,12 @@ fn the_worked_example_is_what_the_writer_makes() {
         }
         let opened = selvedge::open(&file, &selvedge::Limits::NONE).expect("legal");
         assert!(
-            spec.contains(&selvedge_tools::inspect::hex(&opened.decode_digest())),
+            spec.contains(&selvedge_tools::format::info::hex(&opened.decode_digest())),
             "the decode digest of the example is another"
         );
         // Every byte but padding: a stranger can put the example together from the text. The second file
         // shows what the first has not.
-        let parts = selvedge_tools::example::parts(&file);
+        let parts = selvedge_tools::check::example::parts(&file);
         for (name, bytes, offset) in
             parts.iter().filter(|(name, ..)| fence == "```hex" || name.starts_with("section 02"))
         {

@@ -4,14 +4,14 @@ use proptest::prelude::*;
 use selvedge::interpolation::{filtered_values, trilinear_values};
 use selvedge::{Direction, Limits, Rule, Selvedge, Values};
 use selvedge_tests::setting;
-use selvedge_tools::example::example_model;
-use selvedge_tools::extreme::extreme_of_any_method;
-use selvedge_tools::model::MaterialModel;
-use selvedge_tools::random::Random;
-use selvedge_tools::read::{model_of, read_model, same_triangles};
-use selvedge_tools::sector::{Sector, kept_directions};
-use selvedge_tools::trim::{Keep, Trim, trim};
-use selvedge_tools::write::{write_material, write_split};
+use selvedge_tools::check::example::example_model;
+use selvedge_tools::check::extreme::extreme_of_any_method;
+use selvedge_tools::format::model::MaterialModel;
+use selvedge_tools::format::read::{model_of, read_model, same_triangles};
+use selvedge_tools::format::sector::{Sector, kept_directions};
+use selvedge_tools::format::trim::{Keep, Trim, trim};
+use selvedge_tools::format::write::{write_material, write_split};
+use selvedge_tools::math::random::Random;
 use std::path::Path;
 
 fn excerpt() -> Vec<u8> {

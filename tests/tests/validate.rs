@@ -1,14 +1,14 @@
 //! The validator: it agrees with `open`, tells everything, and says the same as text, JSON and SARIF.
 
 use selvedge::{Limits, Rule};
-use selvedge_tools::example::example_model;
-use selvedge_tools::extreme::extreme_model;
-use selvedge_tools::model::{AtomModel, MaterialModel};
-use selvedge_tools::validate::{
+use selvedge_tools::check::example::example_model;
+use selvedge_tools::check::extreme::extreme_model;
+use selvedge_tools::check::validate::{
     ADVICE, Options, Reports, Severity, files_of, sarif, schema, text, validate, validate_files,
 };
-use selvedge_tools::vectors::{Answer, read};
-use selvedge_tools::write::{repair_checksums, write_material};
+use selvedge_tools::check::vectors::{Answer, read};
+use selvedge_tools::format::model::{AtomModel, MaterialModel};
+use selvedge_tools::format::write::{repair_checksums, write_material};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -16,7 +16,7 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-fn check(bytes: &[u8]) -> selvedge_tools::validate::FileReport {
+fn check(bytes: &[u8]) -> selvedge_tools::check::validate::FileReport {
     validate("file", bytes, None, &Options { limits: Limits::NONE, ..Options::default() })
 }
 
@@ -83,7 +83,7 @@ fn unwise_files_are_told_what_is_unwise() {
         edit(&mut model);
         advised(&model)
     };
-    fn ensemble(model: &mut MaterialModel) -> &mut selvedge_tools::model::EnsembleModel {
+    fn ensemble(model: &mut MaterialModel) -> &mut selvedge_tools::format::model::EnsembleModel {
         model.channels[0].ensemble.as_mut().expect("full")
     }
     assert_eq!(changed(&|m| ensemble(m).coefficients[0][0].records[1].coefficients[0].0 = 0), ["W1"]);
@@ -101,7 +101,7 @@ fn unwise_files_are_told_what_is_unwise() {
         model.size = [128, 2];
         model.level_count = 1;
         let e = ensemble(&mut model);
-        e.dictionaries[0].view = selvedge_tools::model::FactorModel {
+        e.dictionaries[0].view = selvedge_tools::format::model::FactorModel {
             columns: 200,
             entries: (0..1000).map(|i| i as i16).collect(),
         };
@@ -110,7 +110,8 @@ fn unwise_files_are_told_what_is_unwise() {
         one.coefficients = vec![(0, 3)];
         let mut records = vec![one.clone(); 64];
         records[7].coefficients = (0..largest).map(|i| (i, (i % 16) as u16)).collect();
-        e.coefficients = vec![vec![selvedge_tools::model::CoefficientsModel { value_bits: 4, records }]];
+        e.coefficients =
+            vec![vec![selvedge_tools::format::model::CoefficientsModel { value_bits: 4, records }]];
         advised(&model)
     };
     assert_eq!((wide(150), wide(20)), (vec!["W4", "W5"], vec!["W4"]));
@@ -188,7 +189,7 @@ fn folders_and_standard_input() {
     let paths = files_of(&[folder.path().to_owned()]).expect("walk");
     assert_eq!(paths.len(), 600);
     let mut seen = Vec::new();
-    let mut each = |report: selvedge_tools::validate::FileReport| {
+    let mut each = |report: selvedge_tools::check::validate::FileReport| {
         seen.push((report.file.clone(), report.exit_code));
         Ok(())
     };

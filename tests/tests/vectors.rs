@@ -2,8 +2,8 @@
 //! stated.
 
 use selvedge::{First, Limits, Rule};
-use selvedge_tools::conform::{run_own, run_program};
-use selvedge_tools::vectors::{Answer, Vector, make, manifest, read};
+use selvedge_tools::check::conform::{run_own, run_program};
+use selvedge_tools::check::vectors::{Answer, Vector, make, manifest, read};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 

@@ -2,20 +2,25 @@
 
 use super::encoding;
 use super::{Source as FileSource, parse_angles, print, print_json};
-use crate::blend::{Blend, blend};
-use crate::dataset::{Dataset, Sample};
-use crate::dictionary_file::{self, Training};
+use crate::data::dataset::{Dataset, Sample};
+use crate::data::expand::expand;
+use crate::data::picture;
 use crate::error::{Result, ToolError};
-use crate::expand::expand;
+use crate::files;
 use crate::foreign::pixels::Colours;
 use crate::foreign::{self, ImportOptions, Kind, btf, images, ubo};
-use crate::measure::{self, Metrics, Source};
-use crate::model::MetadataModel;
+use crate::format::model::MetadataModel;
+use crate::format::read;
+use crate::format::sector::Sector;
+use crate::format::trim::{Keep, Trim, trim};
+use crate::format::write;
+use crate::measure::compare::Place;
+use crate::measure::compare::{self, Metrics, Source};
+use crate::methods::sparse_ensemble::blend::{Blend, blend};
+use crate::methods::sparse_ensemble::dictionary_file::{self, Training};
+use crate::methods::sparse_ensemble::train;
 use crate::progress::Progress;
-use crate::sector::Sector;
 use crate::synth::{self, Mesostructure};
-use crate::trim::{Keep, Trim, trim};
-use crate::{files, measure::Place, picture, read, train, write};
 use clap::{Args, Subcommand, ValueEnum};
 use selvedge::{Direction, Limits, Selvedge};
 use std::path::{Path, PathBuf};
@@ -641,12 +646,12 @@ fn compare(args: CompareArgs) -> Result<u8> {
     }
     let (reference, other) = (source(&a, &file_a), source(&b, &file_b));
     let (description, offset) = match (&a, &file_a) {
-        (_, Some(file)) => (measure::describe(file), measure::log_offset(file)),
+        (_, Some(file)) => (compare::describe(file), compare::log_offset(file)),
         (Given::Data(data), _) => (data.description().clone(), data.statistics().log_offset()),
         (Given::File(..), None) => unreachable!("a file is opened or refused"),
     };
     let progress = Progress::new();
-    let metrics = measure::compare(reference, other, &description, offset, args.peak, &|done, all| {
+    let metrics = compare::compare(reference, other, &description, offset, args.peak, &|done, all| {
         progress.tell("comparing", done, all)
     })?;
     progress.clear();
@@ -657,8 +662,8 @@ fn compare(args: CompareArgs) -> Result<u8> {
     }
     if let Some(path) = &args.picture {
         let [light, view] = [(&description.lights, args.light), (&description.views, args.view)]
-            .map(|(set, asked)| measure::nearest(set, asked));
-        let [a, b] = [reference, other].map(|source| measure::image(source, &description, light, view));
+            .map(|(set, asked)| compare::nearest(set, asked));
+        let [a, b] = [reference, other].map(|source| compare::image(source, &description, light, view));
         picture::beside_error(&b?, &a?, description.size, offset, args.white as f32, args.exposure as f32)
             .save(path)?;
     }

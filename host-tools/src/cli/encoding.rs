@@ -2,17 +2,22 @@
 
 use super::commands::{Threads, parse_bytes, parse_counts, parse_positive, parse_three};
 use super::print_json;
-use crate::baseline::pca;
-use crate::dataset::{Dataset, Description};
-use crate::dictionary::Ensemble;
-use crate::dictionary_file;
-use crate::encode::driver::{EDGES, Event, Verified, Wish, encode_verified, verify};
-use crate::encode::{Options, Prepared, prepare};
+use crate::data::dataset::{Dataset, Description};
+use crate::data::pyramid;
 use crate::error::{Result, ToolError};
-use crate::measure::Metrics;
-use crate::model::TransferModel;
+use crate::files;
+use crate::format::model::TransferModel;
+use crate::measure::baseline::pca;
+use crate::measure::compare::Metrics;
+use crate::methods::sparse_ensemble::dictionary::Ensemble;
+use crate::methods::sparse_ensemble::dictionary_file;
+use crate::methods::sparse_ensemble::encode::driver::{
+    EDGES, Event, Verified, Wish, encode_verified, verify,
+};
+use crate::methods::sparse_ensemble::encode::{Options, Prepared, prepare};
+use crate::methods::sparse_ensemble::train;
+use crate::methods::sparse_tensor;
 use crate::progress::Progress;
-use crate::{files, pyramid, tensor, train};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -191,7 +196,7 @@ struct OfTensor {
     list_coefficients: usize,
     /// Coefficients that were limited to the range of their atom.
     limited: usize,
-    trained: tensor::fit::Trained,
+    trained: sparse_tensor::encode::fit::Trained,
 }
 
 impl Told {
@@ -266,20 +271,20 @@ impl EncodeArgs {
     }
 
     /// The goal of a sparse tensor, whose errors are those of the domain that it codes.
-    fn goal(&self, transfer: Domain, data: &Dataset) -> Result<tensor::Goal> {
+    fn goal(&self, transfer: Domain, data: &Dataset) -> Result<sparse_tensor::encode::Goal> {
         match (self.rmse, self.psnr, self.size) {
-            (Some(rms), ..) if self.domain == transfer => Ok(tensor::Goal::Rms(rms)),
+            (Some(rms), ..) if self.domain == transfer => Ok(sparse_tensor::encode::Goal::Rms(rms)),
             (Some(_), ..) => Err(ToolError::Usage(
                 "--rmse needs --domain and --transfer to be the same with --method sparse-tensor".into(),
             )),
             (_, Some(db), _) if transfer == Domain::Linear => {
-                Ok(tensor::Goal::Rms(data.statistics().largest as f64 / 10f64.powf(db / 20.0)))
+                Ok(sparse_tensor::encode::Goal::Rms(data.statistics().largest as f64 / 10f64.powf(db / 20.0)))
             }
             (_, Some(_), _) => {
                 Err(ToolError::Usage("--psnr needs --transfer linear with --method sparse-tensor".into()))
             }
-            (_, _, Some(bytes)) => Ok(tensor::Goal::Size(bytes)),
-            _ => Ok(tensor::Goal::All),
+            (_, _, Some(bytes)) => Ok(sparse_tensor::encode::Goal::Size(bytes)),
+            _ => Ok(sparse_tensor::encode::Goal::All),
         }
     }
 }
@@ -383,32 +388,32 @@ fn by_tensor(
         args.rank as usize,
         args.memory as usize * 1_000_000,
     )?;
-    let training = tensor::fit::Training::default();
+    let training = sparse_tensor::encode::fit::Training::default();
     let coarser: Vec<&Dataset> = coarser.iter().collect();
     let value_bits = args.value_bits.map(|bits| bits[0]);
     let (shape, fitted, mut first) = match args.shape {
         Some([light_atoms, abrdf_atoms, entries, coefficients]) => {
-            let shape = tensor::fit::Shape { light_atoms, abrdf_atoms, entries, coefficients };
-            (shape, tensor::fit::fit(&components, shape, training, tell), None)
+            let shape = sparse_tensor::encode::fit::Shape { light_atoms, abrdf_atoms, entries, coefficients };
+            (shape, sparse_tensor::encode::fit::fit(&components, shape, training, tell), None)
         }
         None => {
-            let (shape, fitted, encoded) = tensor::Trials::new(&components, training, tell)
+            let (shape, fitted, encoded) = sparse_tensor::encode::Trials::new(&components, training, tell)
                 .encode(&coarser, goal, value_bits, training, tell)?;
             (shape, fitted, Some(encoded))
         }
     };
     // The prediction is within a few parts in a hundred; a goal is met by what is decoded.
     let mut goal = goal;
-    let most = if let tensor::Goal::Rms(rms) = goal { rms } else { f64::INFINITY };
+    let most = if let sparse_tensor::encode::Goal::Rms(rms) = goal { rms } else { f64::INFINITY };
     let mut tries = 0;
     let (encoded, operations, metrics) = loop {
         let encoded = match first.take() {
             Some(encoded) => encoded,
-            None => tensor::encode_fit(
+            None => sparse_tensor::encode::encode_fit(
                 &components,
                 &fitted,
                 &coarser,
-                &tensor::Options { shape, goal, value_bits, training },
+                &sparse_tensor::encode::Options { shape, goal, value_bits, training },
             )?,
         };
         let (metrics, operations) =
@@ -423,7 +428,7 @@ fn by_tensor(
                 "a sparse tensor of this shape reaches {found:.6}, not {most}"
             )));
         }
-        if let tensor::Goal::Rms(rms) = &mut goal {
+        if let sparse_tensor::encode::Goal::Rms(rms) = &mut goal {
             *rms *= most / found * 0.998;
         }
     };
@@ -463,7 +468,7 @@ fn by_ensemble(
 ) -> Result<Vec<Result<Attempt>>> {
     let model = match (transfer, args.offset) {
         (Domain::Log, Some(offset)) => TransferModel::Log2 { offset: offset as f32 },
-        _ => tensor::transfer_of(data, transfer.of_components()),
+        _ => sparse_tensor::encode::transfer_of(data, transfer.of_components()),
     };
     let levels: Vec<&Dataset> = std::iter::once(data).chain(coarser).collect();
     let prepared = prepare(levels, model, &|done, all| progress.tell("means and bases", done, all))?;

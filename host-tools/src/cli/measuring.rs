@@ -3,10 +3,11 @@
 use super::commands::Threads;
 use super::{LimitArgs, print, print_json};
 use crate::error::{Result, ToolError};
+use crate::files;
+use crate::measure::speed::{self, Adapter, Rate, Speed};
 use crate::report::page::{Page, write_stability};
+use crate::report::stability;
 use crate::report::{Operations, Request, Store, sweep};
-use crate::speed::{self, Adapter, Rate, Speed};
-use crate::{files, stability};
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
 

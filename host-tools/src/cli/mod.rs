@@ -6,9 +6,19 @@ mod commands;
 mod encoding;
 mod measuring;
 
+use crate::check::conform;
+use crate::check::explain;
+use crate::check::validate;
+use crate::check::vectors;
 use crate::error::{Result, ToolError};
+use crate::files;
 use crate::foreign::{self, Kind};
-use crate::{conform, demo, explain, files, inspect, kernel, show, sparsebtf, validate, vectors, write};
+use crate::format::info;
+use crate::format::write;
+use crate::gpu::kernel;
+use crate::methods::sparse_ensemble::sparsebtf;
+use crate::show::ball;
+use crate::show::demo;
 use clap::{Args, Parser, Subcommand};
 use selvedge::header::CONTENT_DICTIONARY;
 use selvedge::{Direction, Limits};
@@ -312,11 +322,11 @@ fn tell_info(source: &Source, json: bool) -> Result<u8> {
     let is_stream = source.file == Path::new("-");
     match if is_stream { Kind::Material } else { foreign::detect(&source.file)? } {
         Kind::Material | Kind::Dictionary => with_material(source, |material| {
-            let info = inspect::info(&material);
+            let info = info::info(&material);
             if json {
                 print_json(&info)?
             } else {
-                print(&inspect::info_text(&info))?
+                print(&info::info_text(&info))?
             }
             Ok(0)
         }),
@@ -471,7 +481,7 @@ fn run(cli: Cli) -> Result<u8> {
                     return Err(ToolError::Usage(format!("{name}: this file has {low} to {high}")));
                 }
                 let material = layers.map_or(material, |layers| material.with_layers(layers));
-                let picture = show::decode_picture(&material, level, light, view)?;
+                let picture = ball::decode_picture(&material, level, light, view)?;
                 let is_exr = output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("exr"));
                 let picture = if is_exr { picture } else { picture.exposed(exposure) };
                 picture.save(&output).map(|()| 0)

@@ -28,8 +28,8 @@
 use super::archive::Archive;
 use super::pixels::{self, to_srgb};
 use super::{Clipped, ImportOptions, Imported};
-use crate::dataset::{Dataset, Description, MOST_DIRECTIONS, Sample, Writer, first_beyond};
-use crate::directions::{from_degrees, grid, to_degrees};
+use crate::data::dataset::{Dataset, Description, MOST_DIRECTIONS, Sample, Writer, first_beyond};
+use crate::data::directions::{from_degrees, grid, to_degrees};
 use crate::error::{Result, ToolError};
 use crate::files;
 use exr::prelude::{Image, IntoSample, SpecificChannels, Vec2, WritableImage as _, f16};

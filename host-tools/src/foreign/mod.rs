@@ -7,7 +7,7 @@
 //! | [`ubo`] | a set of images in the layout of UBO2003 |
 //! | [`bytes`] | a file that is read at offsets and never trusted |
 //!
-//! The files of SparseBTF have a module of their own, [`crate::sparsebtf`]: they are not expanded but taken
+//! The files of SparseBTF have a module of their own, [`crate::methods::sparse_ensemble::sparsebtf`]: they are not expanded but taken
 //! over as they are.
 
 pub mod archive;
@@ -17,10 +17,12 @@ pub mod images;
 pub mod pixels;
 pub mod ubo;
 
-use crate::dataset::{Dataset, Description, Sample, Statistics, Writer, first_beyond};
+use crate::data::dataset::{Dataset, Description, Sample, Statistics, Writer, first_beyond};
+use crate::data::directions;
 use crate::error::{Result, ToolError};
-use crate::linear::ordered;
-use crate::{directions, inspect, sparsebtf};
+use crate::format::info;
+use crate::math::linear::ordered;
+use crate::methods::sparse_ensemble::sparsebtf;
 use btf::Btf;
 use glam::DVec3;
 use images::ImageSet;
@@ -154,7 +156,7 @@ pub fn detect(path: &Path) -> Result<Kind> {
         .read_to_end(&mut start)
         .map_err(ToolError::io(path))?;
     if start.starts_with(&selvedge::header::MAGIC) {
-        Ok(if inspect::is_dictionary(&start) { Kind::Dictionary } else { Kind::Material })
+        Ok(if info::is_dictionary(&start) { Kind::Dictionary } else { Kind::Material })
     } else if Dataset::is_one(path) {
         Ok(Kind::Dataset)
     } else if btf::is_one(&start) {

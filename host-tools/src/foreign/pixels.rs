@@ -12,7 +12,7 @@
 //! columns. Its data are rows from the bottom, by the one reader that was written against the archives
 //! (2-propanol/BTF_extractor), and so they are read. Where the two numbers differ the picture is refused.
 
-use crate::dataset::MOST_TEXELS;
+use crate::data::dataset::MOST_TEXELS;
 use exr::prelude::{ReadChannels as _, ReadLayers as _, ReadSpecificChannel as _, Vec2};
 use image::ImageDecoder as _;
 use std::io::{BufRead, Read, Seek, SeekFrom};

@@ -6,8 +6,8 @@
 
 use super::images::{SAME_DEGREES, degrees_between};
 use super::pixels::to_srgb;
-use crate::dataset::Dataset;
-use crate::directions::{from_degrees, to_degrees};
+use crate::data::dataset::Dataset;
+use crate::data::directions::{from_degrees, to_degrees};
 use crate::error::{Result, ToolError};
 use crate::files::{folder_of, persist};
 use glam::DVec3;

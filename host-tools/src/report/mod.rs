@@ -7,16 +7,18 @@
 
 pub mod page;
 pub mod plot;
+pub mod stability;
 pub mod sweep;
 
-use crate::baseline::decoder::{Decoder, Locator, POSITION};
-use crate::dataset::{Dataset, Description};
+use crate::check::count;
+use crate::data::dataset::{Dataset, Description};
+use crate::data::picture::Picture;
 use crate::error::{Result, ToolError};
-use crate::measure::{self, Metrics, Source, compare_every};
-use crate::picture::Picture;
-use crate::similarity::{flip, ssim};
-use crate::speed::{self, Adapter, Speed};
-use crate::{count, files};
+use crate::files;
+use crate::measure::baseline::decoder::{Decoder, Locator, POSITION};
+use crate::measure::compare::{self, Metrics, Source, compare_every};
+use crate::measure::similarity::{flip, ssim};
+use crate::measure::speed::{self, Adapter, Speed};
 use selvedge::{FilteredQuery, Selvedge};
 use serde::{Deserialize, Serialize};
 use std::io::Write as _;
@@ -267,7 +269,7 @@ impl<'a> Bench<'a> {
         out: &'a Path,
     ) -> Result<Bench<'a>> {
         let image = |pair: [usize; 2]| {
-            Ok((pair, measure::image(Source::Data(data), data.description(), pair[0], pair[1])?))
+            Ok((pair, compare::image(Source::Data(data), data.description(), pair[0], pair[1])?))
         };
         let looked_at = pairs_looked_at(data.description()).into_iter().map(image).collect::<Result<_>>()?;
         let mean = data.statistics().mean.iter().sum::<f64>() / 3.0;
@@ -300,7 +302,7 @@ impl<'a> Bench<'a> {
             image.iter().map(|rgb| rgb.map(|c| (c * self.exposure).clamp(0.0, 1.0))).collect()
         };
         let both = |([light, view], reference): &([usize; 2], Vec<[f32; 3]>)| -> Result<[f64; 2]> {
-            let image = measure::image(subject.source(self.locator), description, *light, *view)?;
+            let image = compare::image(subject.source(self.locator), description, *light, *view)?;
             let (a, b) = (shown(reference), shown(&image));
             Ok([ssim(&a, &b, description.size[0]), flip(&a, &b, description.size[0])])
         };
@@ -315,7 +317,7 @@ impl<'a> Bench<'a> {
         for i in [9, 38] {
             let ([light, view], reference) = &self.looked_at[i];
             let decoded = subject
-                .map(|s| measure::image(s.source(self.locator), description, *light, *view))
+                .map(|s| compare::image(s.source(self.locator), description, *light, *view))
                 .transpose()?;
             let [width, height] = description.size;
             let offset = self.data.statistics().log_offset();
@@ -326,8 +328,14 @@ impl<'a> Bench<'a> {
             );
             if let Some(decoded) = &decoded {
                 tiles.push(
-                    crate::picture::log_error(decoded, reference, description.size, offset, ERROR_WHITE)
-                        .enlarged(factor),
+                    crate::data::picture::log_error(
+                        decoded,
+                        reference,
+                        description.size,
+                        offset,
+                        ERROR_WHITE,
+                    )
+                    .enlarged(factor),
                 );
             }
         }

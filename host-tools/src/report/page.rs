@@ -5,8 +5,8 @@ use super::plot::{COSTS, ERRORS, draw};
 use super::{HeldOut, Kind, Line, Operations, methods_of, to_csv};
 use crate::error::{Result, ToolError};
 use crate::files;
-use crate::speed::Rate;
-use crate::stability::Verdict;
+use crate::measure::speed::Rate;
+use crate::report::stability::Verdict;
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -235,7 +235,7 @@ fn embedded(out: &Path, name: &str) -> String {
     format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(bytes))
 }
 
-/// The table of cases of [`crate::stability`], as `stability.html` and `stability.json`.
+/// The table of cases of [`crate::report::stability`], as `stability.html` and `stability.json`.
 ///
 /// # Errors
 /// If a file cannot be written.

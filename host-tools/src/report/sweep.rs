@@ -1,17 +1,19 @@
 //! The sweep: every method at every budget, made, measured and kept.
 
 use super::{Bench, HeldOut, Kind, Line, REVISION, Request, Store, Subject, forget_peak, peak_memory};
-use crate::baseline::data::Uncompressed;
-use crate::baseline::decoder::{Decoder, Locator};
-use crate::baseline::pca::{Domain, pca};
-use crate::baseline::{clusters, published, tucker};
-use crate::dataset::{Dataset, Description, Writer};
-use crate::encode::driver::open_made;
-use crate::encode::{self, prepare};
+use crate::data::dataset::{Dataset, Description, Writer};
 use crate::error::{Result, ToolError};
-use crate::speed::{self, Adapter};
-use crate::tensor::{self, fit};
-use crate::{files, progress::Progress};
+use crate::files;
+use crate::measure::baseline::data::Uncompressed;
+use crate::measure::baseline::decoder::{Decoder, Locator};
+use crate::measure::baseline::pca::{Domain, pca};
+use crate::measure::baseline::{clusters, published, tucker};
+use crate::measure::speed::{self, Adapter};
+use crate::methods::sparse_ensemble::encode::driver::open_made;
+use crate::methods::sparse_ensemble::encode::{self, prepare};
+use crate::methods::sparse_tensor;
+use crate::methods::sparse_tensor::encode::fit;
+use crate::progress::Progress;
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -120,7 +122,7 @@ fn ensembles(
     }
     visitor.begin();
     let begun = Instant::now();
-    let prepared = prepare(vec![data], tensor::transfer_of(data, domain), &|_, _| ())?;
+    let prepared = prepare(vec![data], sparse_tensor::encode::transfer_of(data, domain), &|_, _| ())?;
     let shared = begun.elapsed().as_secs_f64();
     for &edge in edges {
         let bases = prepared.own_ensembles(edge);
@@ -196,12 +198,12 @@ fn components(
         (visitor.say)(&format!("{of_tensor}: trial dictionaries"));
         let begun = Instant::now();
         let training = fit::Training::default();
-        let trials = tensor::Trials::new(&whole, training, |_, _, _| ());
+        let trials = sparse_tensor::encode::Trials::new(&whole, training, |_, _, _| ());
         let shared = shared + begun.elapsed().as_secs_f64();
         for budget in wanted {
             (visitor.say)(&format!("{of_tensor} at {budget} bytes"));
             let begun = Instant::now();
-            let goal = tensor::Goal::Size(budget);
+            let goal = sparse_tensor::encode::Goal::Size(budget);
             let Some((shape, _, encoded)) =
                 kept(trials.encode(&[], goal, None, training, |_, _, _| ()), &of_tensor, visitor)?
             else {
@@ -407,7 +409,7 @@ fn split(set: &[glam::DVec3]) -> [Vec<usize>; 2] {
 
 /// Something that finds directions: a small file of the same sets.
 fn finder(data: &Dataset) -> Result<Vec<u8>> {
-    let prepared = prepare(vec![data], tensor::transfer_of(data, Domain::Log), &|_, _| ())?;
+    let prepared = prepare(vec![data], sparse_tensor::encode::transfer_of(data, Domain::Log), &|_, _| ())?;
     let options =
         encode::Options { edge: 8, goal: encode::Goal::Coefficients([1; 3]), ..encode::Options::default() };
     Ok(encode::encode(&prepared, &prepared.own_ensembles(8), &options, &|_, _| ())?.bytes)

@@ -30,10 +30,10 @@ pub mod yarns;
 
 pub use preview::preview;
 
-use crate::dataset::{Description, Sample, Statistics, Writer};
-use crate::directions;
+use crate::data::dataset::{Description, Sample, Statistics, Writer};
+use crate::data::directions;
 use crate::error::{Result, ToolError};
-use crate::random::Random;
+use crate::math::random::Random;
 use glam::{DVec3, Vec3A};
 use rayon::prelude::*;
 use std::path::Path;
@@ -209,7 +209,7 @@ fn texel_values(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dataset::Dataset;
+    use crate::data::dataset::Dataset;
     use mesh::{Look, Mesh, Tube};
 
     fn description(size: [usize; 2], sample: Sample) -> Description {

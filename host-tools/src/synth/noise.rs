@@ -1,7 +1,7 @@
 //! Periodic value noise in two dimensions, from a repeatable table: variation of colour, width and path that
 //! still tiles.
 
-use crate::random::Random;
+use crate::math::random::Random;
 
 /// A random number from -1 to 1.
 pub fn signed(random: &mut Random) -> f32 {

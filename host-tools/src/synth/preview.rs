@@ -3,8 +3,8 @@
 use super::Mesostructure;
 use super::mesh::Mesh;
 use super::shade::Scene;
-use crate::directions;
-use crate::picture::Picture;
+use crate::data::directions;
+use crate::data::picture::Picture;
 use glam::Vec3A;
 use rayon::prelude::*;
 

@@ -119,7 +119,7 @@ fn fill(heights: &mut [u16], [a, b, c]: [Vec3A; 3]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::directions;
+    use crate::data::directions;
     use crate::synth::Mesostructure;
     use crate::synth::trace::Tracer;
 

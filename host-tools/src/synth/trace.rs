@@ -163,7 +163,7 @@ mod tests {
         for kind in crate::synth::Mesostructure::all() {
             let tracer = Tracer::new(&kind.mesh(2));
             for direction in
-                [81, 151].into_iter().flat_map(|count| crate::directions::grid(count).expect("known"))
+                [81, 151].into_iter().flat_map(|count| crate::data::directions::grid(count).expect("known"))
             {
                 // Among them the corners of cells, and rays along their edges.
                 for i in 0..64 {

@@ -6,7 +6,7 @@
 
 use super::mesh::{Look, Mesh, Tube};
 use super::noise::{Noise, signed};
-use crate::random::Random;
+use crate::math::random::Random;
 use glam::{Vec2, Vec3A, vec2, vec3a};
 use std::f32::consts::{PI, TAU};
 

@@ -5,11 +5,11 @@
 
 use selvedge::Limits;
 use selvedge_tests::targets::suite;
-use selvedge_tools::extreme::extreme_of_any_method;
+use selvedge_tools::check::extreme::extreme_of_any_method;
+use selvedge_tools::check::vectors::{Answer, Vector, answer, manifest};
 use selvedge_tools::files;
-use selvedge_tools::random::Random;
-use selvedge_tools::vectors::{Answer, Vector, answer, manifest};
-use selvedge_tools::write::{repair_checksums, write_material};
+use selvedge_tools::format::write::{repair_checksums, write_material};
+use selvedge_tools::math::random::Random;
 use std::path::Path;
 
 fn main() {

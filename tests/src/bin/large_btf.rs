@@ -5,7 +5,7 @@
 //! 151), components of each channel. See "Bring your own BTF" of the README for what importing it takes.
 
 use selvedge_tests::foreign::write_large;
-use selvedge_tools::directions::{grid, to_degrees};
+use selvedge_tools::data::directions::{grid, to_degrees};
 use std::io::{BufWriter, Write as _};
 
 fn main() {

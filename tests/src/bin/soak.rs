@@ -10,7 +10,7 @@
 
 use peak_alloc::PeakAlloc;
 use selvedge_tests::targets::{TARGETS, suite};
-use selvedge_tools::random::Random;
+use selvedge_tools::math::random::Random;
 use std::path::Path;
 
 #[global_allocator]

@@ -4,7 +4,7 @@ use super::Head;
 use super::colour::Model;
 use crate::error::Result;
 use crate::foreign::bytes::{Bytes, Cursor, Width};
-use crate::linear::product_bt;
+use crate::math::linear::product_bt;
 
 /// How the values of a file become radiance.
 #[derive(Debug)]

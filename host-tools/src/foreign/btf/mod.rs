@@ -32,7 +32,7 @@ pub mod colour;
 pub mod write;
 
 use super::bytes::{Bytes, Cursor};
-use crate::dataset::{MOST_DIRECTIONS, MOST_TEXELS};
+use crate::data::dataset::{MOST_DIRECTIONS, MOST_TEXELS};
 use crate::error::{Result, ToolError};
 use body::Body;
 use glam::DVec3;

@@ -6,11 +6,11 @@
 //! needs it to be.
 
 use super::SIGNATURES;
-use crate::baseline::pca::{Domain, pca};
-use crate::dataset::{Dataset, Description};
-use crate::directions::to_degrees;
+use crate::data::dataset::{Dataset, Description};
+use crate::data::directions::to_degrees;
 use crate::error::{Result, ToolError};
 use crate::files;
+use crate::measure::baseline::pca::{Domain, pca};
 use glam::DVec3;
 use std::path::Path;
 

@@ -1,0 +1,9 @@
+//! Files held against the specification: findings, advice, costs, samples taken apart, and the conformance suite.
+
+pub mod conform;
+pub mod count;
+pub mod example;
+pub mod explain;
+pub mod extreme;
+pub mod validate;
+pub mod vectors;

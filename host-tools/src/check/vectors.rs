@@ -1,0 +1,593 @@
+//! The conformance suite: readable recipes become files, and files are held against what their recipes state.
+//!
+//! A recipe names a base, changes to its model by JSON pointer, and changes to its bytes by place; an invalid
+//! one states the rule that is broken, where, and what is found there (1.4-4). What is stated comes from the
+//! recipe alone, never from a decoder.
+
+use crate::check::example::{example_model, tensor_example_model};
+use crate::check::extreme::{extreme_model, extreme_tensor};
+use crate::error::{Result, ToolError};
+use crate::files;
+use crate::format::info::hex;
+use crate::format::model::MaterialModel;
+use crate::format::triangulate::{triangulate, with_grid};
+use crate::format::write::{
+    Part, directions_part, lay_out, repair_checksums, repair_header_checksum, take_apart, words_to_bytes,
+    write_dictionary, write_material, write_split,
+};
+use selvedge::Limits;
+use serde::Deserialize;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// A file of recipes: those of one chapter.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Chapter {
+    #[serde(default)]
+    valid: Vec<Recipe>,
+    #[serde(default)]
+    invalid: Vec<Recipe>,
+}
+
+/// How one file is made.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Recipe {
+    /// Name of the file.
+    name: String,
+    /// What it is for.
+    note: String,
+    /// `example`, `extreme SEED`, or the name of another recipe whose model is taken.
+    #[serde(default = "example")]
+    base: String,
+    /// Which file of the model: `whole`, or `material` or `dictionary` where it is split in two.
+    #[serde(default)]
+    part: FilePart,
+    /// Values of the model by JSON pointer.
+    #[serde(default)]
+    change: BTreeMap<String, Value>,
+    /// Changes to the bytes, in order.
+    #[serde(default)]
+    bytes: Vec<Edit>,
+    /// Checksums that are made right at the end.
+    #[serde(default)]
+    checksums: Checksums,
+    /// Name of the vector that is given as the external dictionary.
+    dictionary: Option<String>,
+    /// Limits of the caller: bytes, operations, texels; 0 for none.
+    limits: Option<[u32; 3]>,
+    /// What an invalid file breaks.
+    expect: Option<Expect>,
+}
+
+fn example() -> String {
+    "example".into()
+}
+
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum FilePart {
+    #[default]
+    Whole,
+    Material,
+    Dictionary,
+}
+
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq)]
+#[serde(rename_all = "lowercase")]
+enum Checksums {
+    #[default]
+    All,
+    Header,
+    None,
+}
+
+/// A number, or one in hexadecimal as text.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(untagged)]
+enum Number {
+    Plain(i64),
+    Text(String),
+}
+
+impl Number {
+    fn get(&self) -> Result<u32> {
+        let wide = match self {
+            Number::Plain(n) => Some(*n),
+            Number::Text(text) => text.strip_prefix("0x").and_then(|hex| i64::from_str_radix(hex, 16).ok()),
+        };
+        let fits = wide.filter(|n| (-(1i64 << 31)..1i64 << 32).contains(n));
+        fits.map(|n| n as u32).ok_or_else(|| ToolError::Usage(format!("{self:?} is no number of 32 bits")))
+    }
+}
+
+/// Four bytes a word, of a recipe.
+fn words_of(numbers: &[Number]) -> Result<Vec<u8>> {
+    Ok(words_to_bytes(&numbers.iter().map(Number::get).collect::<Result<Vec<u32>>>()?))
+}
+
+/// One change to the bytes. Places are `12`, `entry 0003.0000 + 4` or `section 0003.0000 + 48`.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(untagged, deny_unknown_fields)]
+enum Edit {
+    /// Writes a number of 1, 2 or 4 bytes.
+    Set { set: String, to: Number, width: Option<usize> },
+    /// Flips bits of a byte.
+    Flip { flip: String, bits: u8 },
+    /// Shortens the file to so many bytes.
+    Cut { cut: usize },
+    /// Adds zeros at its end.
+    Extend { extend: usize },
+    /// New words for a section; the file is laid out again.
+    Words { section: String, words: Vec<Number> },
+    /// More words at the end of a section.
+    Append { section: String, append: Vec<Number> },
+    /// Fewer bytes at the end of a section.
+    Drop { section: String, drop: usize },
+    /// Bytes `from` to `to` of a section, turned left.
+    Rotate { section: String, rotate: [usize; 3] },
+    /// A byte of a section; the file is laid out again.
+    Byte { section: String, byte: usize, to: u8 },
+    /// Takes a section away.
+    Remove { remove: String },
+    /// A new section.
+    Add { add: String, words: Vec<Number> },
+    /// A set of directions with triangles, hull and grid as given, or triangulated with a grid of this size.
+    Directions {
+        directions: u32,
+        points: Vec<[i32; 2]>,
+        triangles: Option<Vec<[u32; 3]>>,
+        hull: Option<Vec<u32>>,
+        grid: u32,
+    },
+    /// Digest and length of the external dictionary become those of a vector.
+    Reference { reference: String },
+}
+
+/// What a checker reports first.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Expect {
+    rule: String,
+    #[serde(default)]
+    part: ExpectPart,
+    at: String,
+    found: Number,
+}
+
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum ExpectPart {
+    #[default]
+    File,
+    Dictionary,
+}
+
+/// What a vector must give.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Answer {
+    /// The decode digest in hexadecimal.
+    Digest(String),
+    /// A legal dictionary, which has no digest.
+    Legal,
+    /// A finding: rule, `file` or `dictionary`, byte offset, what was found.
+    Broken(String, String, u32, u32),
+}
+
+/// One vector.
+#[derive(Clone, Debug)]
+pub struct Vector {
+    /// Path inside the suite.
+    pub path: String,
+    /// What it is for.
+    pub note: String,
+    /// Its bytes.
+    pub bytes: Vec<u8>,
+    /// Path of the dictionary that is given with it.
+    pub dictionary: Option<String>,
+    /// Limits of the caller: bytes, operations, texels.
+    pub limits: Option<[u32; 3]>,
+    /// What is expected; of a valid material as the suite's manifest states it, or as this decoder answers
+    /// while it is made.
+    pub answer: Answer,
+}
+
+impl Vector {
+    /// The caller's limits.
+    pub fn limits(&self) -> Limits {
+        let or_none = |n: u32| if n == 0 { u32::MAX } else { n };
+        self.limits.map_or(Limits::NONE, |[bytes, operations, texels]| Limits {
+            bytes: or_none(bytes),
+            operations: or_none(operations),
+            texels: or_none(texels),
+        })
+    }
+}
+
+/// A place in a file by its recipe's words.
+fn place(file: &[u8], text: &str) -> Result<usize> {
+    let bad = || ToolError::Usage(format!("`{text}` is no place of the file"));
+    let (base, add) = match text.split_once('+') {
+        Some((base, add)) => (base.trim(), add.trim().parse().map_err(|_| bad())?),
+        None => (text.trim(), 0usize),
+    };
+    if let Ok(offset) = base.parse::<usize>() {
+        return Ok(offset + add);
+    }
+    let (what, section) = base.split_once(' ').ok_or_else(bad)?;
+    let (kind, instance) = section_key(section)?;
+    let word = |at: usize| file.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+    let count = word(24).unwrap_or(0) as usize;
+    let entry = (0..count.min(4096))
+        .map(|i| 128 + i * 16)
+        .find(|&e| word(e) == Some(kind | instance << 16))
+        .ok_or_else(bad)?;
+    match what {
+        "entry" => Ok(entry + add),
+        "section" => Ok(word(entry + 4).ok_or_else(bad)? as usize + add),
+        _ => Err(bad()),
+    }
+}
+
+/// Kind and instance of `0113.0000`.
+fn section_key(text: &str) -> Result<(u32, u32)> {
+    let parts = text
+        .split_once('.')
+        .map(|(kind, instance)| (u32::from_str_radix(kind, 16), u32::from_str_radix(instance, 16)));
+    let Some((Ok(kind), Ok(instance))) = parts else {
+        return Err(ToolError::Usage(format!("`{text}` is no section")));
+    };
+    Ok((kind, instance))
+}
+
+impl Edit {
+    /// Whether places of later edits and of the expectation are looked up behind this edit.
+    fn moves(&self) -> bool {
+        !matches!(self, Edit::Set { .. } | Edit::Flip { .. } | Edit::Cut { .. } | Edit::Extend { .. })
+    }
+
+    fn apply(&self, file: &mut Vec<u8>, made: &BTreeMap<String, Vector>) -> Result<()> {
+        let outside = || ToolError::Usage(format!("{self:?} lies outside the file"));
+        match self {
+            Edit::Set { set, to, width } => {
+                let (at, width, value) = (place(file, set)?, width.unwrap_or(4), to.get()?.to_le_bytes());
+                let slot = file.get_mut(at..at + width).ok_or_else(outside)?;
+                let new = value.get(..width).ok_or_else(outside)?;
+                if slot == new {
+                    return Err(ToolError::Usage(format!("{self:?} changes nothing")));
+                }
+                slot.copy_from_slice(new);
+            }
+            Edit::Flip { flip, bits } => {
+                let at = place(file, flip)?;
+                *file.get_mut(at).ok_or_else(outside)? ^= bits;
+            }
+            Edit::Cut { cut } => file.truncate(*cut),
+            Edit::Extend { extend } => file.resize(file.len() + extend, 0),
+            Edit::Remove { remove } => {
+                let key = section_key(remove)?;
+                with_parts(file, |parts| parts.retain(|part| (part.kind, part.instance) != key));
+            }
+            Edit::Add { add, words } => {
+                let ((kind, instance), bytes) = (section_key(add)?, words_of(words)?);
+                with_parts(file, |parts| parts.push(Part { kind, instance, bytes }));
+            }
+            Edit::Words { section, words } => *section_of(file, section)? = words_of(words)?,
+            Edit::Append { section, append } => section_of(file, section)?.extend(words_of(append)?),
+            Edit::Drop { section, drop } => {
+                let mut bytes = section_of(file, section)?;
+                let left = bytes.len().checked_sub(*drop).ok_or_else(outside)?;
+                bytes.truncate(left);
+            }
+            Edit::Rotate { section, rotate: [from, to, by] } => {
+                section_of(file, section)?.get_mut(*from..*to).ok_or_else(outside)?.rotate_left(*by)
+            }
+            Edit::Byte { section, byte, to } => {
+                *section_of(file, section)?.get_mut(*byte).ok_or_else(outside)? = *to
+            }
+            Edit::Directions { directions, points, triangles, hull, grid } => {
+                let own = triangulate(points, None);
+                let t = with_grid(
+                    points,
+                    triangles.clone().unwrap_or(own.triangles),
+                    hull.clone().unwrap_or(own.hull),
+                    *grid,
+                );
+                *section_of(file, &format!("0003.{directions:04x}"))? =
+                    directions_part(*directions, points, &t).bytes;
+            }
+            Edit::Reference { reference } => {
+                let other = made.get(reference).ok_or_else(|| {
+                    ToolError::Usage(format!("{reference}: no recipe before this one has the name"))
+                })?;
+                let words = words_to_bytes(&[other.bytes.len() as u32, 0, 0, 0]);
+                *section_of(file, "0002.0000")? = [&selvedge::sha256(&other.bytes)[..], &words].concat();
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Changes the sections of a file and lays it out again.
+fn with_parts(file: &mut Vec<u8>, change: impl FnOnce(&mut Vec<Part>)) {
+    let (header, mut parts) = take_apart(file);
+    change(&mut parts);
+    *file = lay_out(header, parts);
+}
+
+/// The bytes of a section; the file is laid out again when they are let go.
+struct SectionBytes<'a> {
+    file: &'a mut Vec<u8>,
+    header: [u32; 32],
+    parts: Vec<Part>,
+    at: usize,
+}
+
+fn section_of<'a>(file: &'a mut Vec<u8>, section: &str) -> Result<SectionBytes<'a>> {
+    let key = section_key(section)?;
+    let (header, parts) = take_apart(file);
+    let at = parts.iter().position(|part| (part.kind, part.instance) == key);
+    let at = at.ok_or_else(|| ToolError::Usage(format!("the file has no section {section}")))?;
+    Ok(SectionBytes { file, header, parts, at })
+}
+
+impl std::ops::Deref for SectionBytes<'_> {
+    type Target = Vec<u8>;
+
+    fn deref(&self) -> &Vec<u8> {
+        &self.parts[self.at].bytes
+    }
+}
+
+impl std::ops::DerefMut for SectionBytes<'_> {
+    fn deref_mut(&mut self) -> &mut Vec<u8> {
+        &mut self.parts[self.at].bytes
+    }
+}
+
+impl Drop for SectionBytes<'_> {
+    fn drop(&mut self) {
+        *self.file = lay_out(self.header, std::mem::take(&mut self.parts));
+    }
+}
+
+/// The model of a base, changed.
+fn model_of(recipe: &Recipe, models: &BTreeMap<String, MaterialModel>) -> Result<MaterialModel> {
+    let wrong = |why: String| ToolError::Usage(format!("{}: {why}", recipe.name));
+    let base = match recipe.base.split_once(' ') {
+        _ if recipe.base == "example" => example_model(),
+        _ if recipe.base == "tensor example" => tensor_example_model(),
+        Some(("extreme-tensor", seed)) => {
+            extreme_tensor(seed.parse().map_err(|_| wrong(format!("`{seed}` is no seed")))?)
+        }
+        Some(("extreme", seed)) => {
+            extreme_model(seed.parse().map_err(|_| wrong(format!("`{seed}` is no seed")))?)
+        }
+        _ => models
+            .get(&recipe.base)
+            .cloned()
+            .ok_or_else(|| wrong(format!("no recipe before this one is `{}`", recipe.base)))?,
+    };
+    if recipe.change.is_empty() {
+        return Ok(base);
+    }
+    let mut value = serde_json::to_value(&base).map_err(|error| wrong(error.to_string()))?;
+    for (pointer, new) in &recipe.change {
+        let slot = value.pointer_mut(pointer).ok_or_else(|| wrong(format!("the model has no {pointer}")))?;
+        if slot == new {
+            return Err(wrong(format!("{pointer} is changed to what it is")));
+        }
+        *slot = new.clone();
+    }
+    serde_json::from_value(value).map_err(|error| wrong(error.to_string()))
+}
+
+/// Name of a part in a manifest.
+fn part_name(part: selvedge::Part) -> &'static str {
+    if part == selvedge::Part::File { "file" } else { "dictionary" }
+}
+
+/// What this decoder says of a vector.
+pub fn answer(bytes: &[u8], dictionary: Option<&[u8]>, limits: &Limits) -> Answer {
+    if crate::format::info::is_dictionary(bytes) {
+        let mut first = selvedge::First::default();
+        selvedge::validate(bytes, dictionary, limits, &mut first);
+        return match first.0 {
+            None => Answer::Legal,
+            Some(f) => Answer::Broken(f.rule.id().into(), part_name(f.part).into(), f.offset, f.found),
+        };
+    }
+    match selvedge::open_with(bytes, dictionary, limits) {
+        Ok(material) => Answer::Digest(hex(&material.decode_digest())),
+        Err(f) => Answer::Broken(f.rule.id().into(), part_name(f.part).into(), f.offset, f.found),
+    }
+}
+
+/// Makes every vector of a folder of recipes, in the order of their files.
+///
+/// # Errors
+/// If a recipe cannot be read or carried out.
+pub fn make(folder: &Path) -> Result<Vec<Vector>> {
+    let recipes = folder.join("recipes");
+    let mut paths: Vec<PathBuf> = std::fs::read_dir(&recipes)
+        .map_err(ToolError::io(&recipes))?
+        .filter_map(|entry| entry.ok().map(|entry| entry.path()))
+        .collect();
+    paths.retain(|path| path.extension().is_some_and(|ending| ending == "json"));
+    paths.sort();
+    let (mut made, mut models, mut order) = (BTreeMap::new(), BTreeMap::new(), Vec::new());
+    for path in paths {
+        let text = files::read(&path)?;
+        let chapter: Chapter = serde_json::from_slice(&text)
+            .map_err(|error| ToolError::Usage(format!("{}: {error}", path.display())))?;
+        let of = |kind: &'static str| move |recipe| (kind, recipe);
+        for (kind, recipe) in
+            chapter.valid.into_iter().map(of("valid")).chain(chapter.invalid.into_iter().map(of("invalid")))
+        {
+            let model = model_of(&recipe, &models)?;
+            let vector = make_one(kind, &recipe, &model, &made)
+                .map_err(|error| ToolError::Usage(format!("{}: {error}", recipe.name)))?;
+            if kind == "valid" {
+                models.insert(recipe.name.clone(), model);
+            }
+            order.push(recipe.name.clone());
+            if made.insert(recipe.name.clone(), vector).is_some() {
+                return Err(ToolError::Usage(format!("two recipes have the name {}", recipe.name)));
+            }
+        }
+    }
+    Ok(order.into_iter().filter_map(|name| made.remove(&name)).collect())
+}
+
+fn make_one(
+    kind: &str,
+    recipe: &Recipe,
+    model: &MaterialModel,
+    made: &BTreeMap<String, Vector>,
+) -> Result<Vector> {
+    let mut bytes = match recipe.part {
+        FilePart::Whole => write_material(model),
+        FilePart::Material => write_split(model).0,
+        FilePart::Dictionary => write_dictionary(&MaterialModel { extras: Vec::new(), ..model.clone() }),
+    };
+    let moving = recipe.bytes.iter().rposition(Edit::moves).map_or(0, |last| last + 1);
+    for edit in &recipe.bytes[..moving] {
+        edit.apply(&mut bytes, made)?;
+    }
+    let whole = bytes.clone();
+    for edit in &recipe.bytes[moving..] {
+        edit.apply(&mut bytes, made)?;
+    }
+    match recipe.checksums {
+        Checksums::All if !recipe.bytes.is_empty() => repair_checksums(&mut bytes),
+        Checksums::Header => repair_header_checksum(&mut bytes),
+        _ => {}
+    }
+    let dictionary = recipe
+        .dictionary
+        .as_ref()
+        .map(|name| made.get(name).ok_or_else(|| ToolError::Usage(format!("no recipe before it is {name}"))));
+    let dictionary = dictionary.transpose()?;
+    let path = format!("{kind}/{}.selv", recipe.name);
+    let mut vector = Vector {
+        path,
+        note: recipe.note.clone(),
+        bytes,
+        dictionary: dictionary.map(|d| d.path.clone()),
+        limits: recipe.limits,
+        answer: Answer::Legal,
+    };
+    vector.answer = match (&recipe.expect, kind) {
+        (Some(expect), "invalid") => {
+            let of_dictionary = matches!(expect.part, ExpectPart::Dictionary);
+            let looked_at = if of_dictionary { dictionary.map_or(&[][..], |d| &d.bytes) } else { &whole };
+            let part = if of_dictionary { "dictionary" } else { "file" };
+            Answer::Broken(
+                expect.rule.clone(),
+                part.into(),
+                place(looked_at, &expect.at)? as u32,
+                expect.found.get()?,
+            )
+        }
+        (None, "valid") => match answer(&vector.bytes, dictionary.map(|d| &d.bytes[..]), &vector.limits()) {
+            Answer::Broken(rule, part, at, found) => {
+                return Err(ToolError::Mismatch(format!(
+                    "{}: a valid file, which breaks {rule} at byte {at} of the {part} (found {found})",
+                    vector.path
+                )));
+            }
+            answer => answer,
+        },
+        _ => return Err(ToolError::Usage("invalid files state what they break, valid ones do not".into())),
+    };
+    Ok(vector)
+}
+
+/// The list of a suite: a line a vector, columns parted by tabs.
+pub fn manifest(vectors: &[Vector]) -> String {
+    let mut text = String::from(
+        "# valid\tfile\tdictionary\tdecode digest\n# invalid\tfile\tdictionary\tlimits: bytes,operations,texels\trule\tpart\toffset\tfound\n",
+    );
+    for v in vectors {
+        let dictionary = v.dictionary.as_deref().unwrap_or("-");
+        let limits = v
+            .limits
+            .map_or("-".into(), |[bytes, operations, texels]| format!("{bytes},{operations},{texels}"));
+        let _ = match &v.answer {
+            Answer::Digest(digest) => writeln!(text, "valid\t{}\t{dictionary}\t{digest}", v.path),
+            Answer::Legal => writeln!(text, "valid\t{}\t{dictionary}\t-", v.path),
+            Answer::Broken(rule, part, offset, found) => writeln!(
+                text,
+                "invalid\t{}\t{dictionary}\t{limits}\t{rule}\t{part}\t{offset}\t{found}",
+                v.path
+            ),
+        };
+    }
+    text
+}
+
+/// Reads a suite as it lies in a folder: its manifest and its files, without recipes.
+///
+/// # Errors
+/// If a file cannot be read or the manifest is none.
+pub fn read(folder: &Path) -> Result<Vec<Vector>> {
+    let path = folder.join("manifest.tsv");
+    let bytes = files::read(&path)?;
+    let text = String::from_utf8_lossy(&bytes).into_owned();
+    let mut vectors = Vec::new();
+    for (number, line) in
+        text.lines().enumerate().filter(|(_, line)| !line.starts_with('#') && !line.is_empty())
+    {
+        let wrong = || ToolError::Usage(format!("{}: line {} is not understood", path.display(), number + 1));
+        let columns: Vec<&str> = line.split('\t').collect();
+        let optional = |text: &str| (text != "-").then(|| text.to_owned());
+        let (file, dictionary, limits, answer) = match columns.as_slice() {
+            ["valid", file, dictionary, digest] => {
+                (*file, optional(dictionary), None, optional(digest).map_or(Answer::Legal, Answer::Digest))
+            }
+            ["invalid", file, dictionary, limits, rule, part, offset, found] => {
+                let number = |text: &str| text.parse::<u32>().map_err(|_| wrong());
+                let limits = optional(limits)
+                    .map(|text| text.split(',').map(number).collect::<Result<Vec<u32>>>())
+                    .transpose()?;
+                let limits = limits.map(|l| <[u32; 3]>::try_from(l).map_err(|_| wrong())).transpose()?;
+                (
+                    *file,
+                    optional(dictionary),
+                    limits,
+                    Answer::Broken((*rule).into(), (*part).into(), number(offset)?, number(found)?),
+                )
+            }
+            _ => return Err(wrong()),
+        };
+        vectors.push(Vector {
+            path: file.into(),
+            note: String::new(),
+            bytes: files::read(&folder.join(file))?,
+            dictionary,
+            limits,
+            answer,
+        });
+    }
+    Ok(vectors)
+}
+
+/// Writes a suite beside its recipes: files, and the manifest last.
+///
+/// # Errors
+/// If something cannot be made or written.
+pub fn write(folder: &Path) -> Result<usize> {
+    let vectors = make(folder)?;
+    for kind in ["valid", "invalid"] {
+        let path = folder.join(kind);
+        std::fs::create_dir_all(&path).map_err(ToolError::io(&path))?;
+    }
+    for vector in &vectors {
+        files::write(&folder.join(&vector.path), &vector.bytes)?;
+    }
+    files::write(&folder.join("manifest.tsv"), manifest(&vectors).as_bytes())?;
+    Ok(vectors.len())
+}

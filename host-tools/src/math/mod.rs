@@ -1,0 +1,5 @@
+//! Matrices, decompositions and random numbers of training and encoding.
+
+pub mod ksvd;
+pub mod linear;
+pub mod random;

@@ -1,0 +1,3 @@
+//! The sparse tensor (chapter 12; Ruiters and Klein 2009).
+
+pub mod encode;
