@@ -17,6 +17,7 @@
 pub mod check;
 pub mod cli;
 pub mod data;
+pub mod encode;
 pub mod error;
 pub mod files;
 pub mod foreign;

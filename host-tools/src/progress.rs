@@ -35,7 +35,7 @@ impl Progress {
     }
 
     /// Says that `done` of `all` parts of something are done.
-    pub fn tell(&self, what: &str, done: usize, all: usize) {
+    pub fn report(&self, what: &str, done: usize, all: usize) {
         let Ok(mut state) = self.state.lock() else { return };
         let now = Instant::now();
         // What went by since the last word belongs to what was done by then.

@@ -1,9 +1,10 @@
 //! The command that encodes: its options, which method each is of, and the choice between methods.
 
-use super::commands::{Threads, parse_bytes, parse_counts, parse_positive, parse_three};
-use super::print_json;
+use super::common::{Threads, print_json};
+use super::parse;
 use crate::data::dataset::{Dataset, Description};
 use crate::data::pyramid;
+use crate::encode::parse::{counts, positive, three};
 use crate::error::{Result, ToolError};
 use crate::files;
 use crate::format::model::TransferModel;
@@ -59,23 +60,23 @@ enum Preference {
 }
 
 #[derive(Args)]
-pub struct EncodeArgs {
+pub struct Arguments {
     /// The dataset
     dataset: PathBuf,
     /// The file to write
     #[arg(short, long)]
     output: PathBuf,
     /// Goal: root mean squared error, in the domain of --domain
-    #[arg(long, value_parser = parse_positive, group = "goal")]
+    #[arg(long, value_parser = positive, group = "goal")]
     rmse: Option<f64>,
     /// Goal: peak signal to noise ratio of linear radiance against the largest value, decibels
-    #[arg(long, value_parser = parse_positive, group = "goal")]
+    #[arg(long, value_parser = positive, group = "goal")]
     psnr: Option<f64>,
     /// Goal: bytes of the file, as 200000, 200k or 1.5M
-    #[arg(long, value_parser = parse_bytes, group = "goal")]
+    #[arg(long, value_parser = parse::bytes, group = "goal")]
     size: Option<u64>,
     /// Goal: coefficients of a block in each channel, as 256,64,64
-    #[arg(long, value_parser = parse_counts, group = "goal")]
+    #[arg(long, value_parser = counts, group = "goal")]
     coefficients: Option<[usize; 3]>,
     /// What --rmse is an error of
     #[arg(long, value_enum, default_value = "log")]
@@ -102,13 +103,13 @@ pub struct EncodeArgs {
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=15))]
     levels: u16,
     /// Bits of a value in each channel; chosen if not given
-    #[arg(long, value_parser = parse_three::<u32>)]
+    #[arg(long, value_parser = three::<u32>)]
     value_bits: Option<[u32; 3]>,
     /// Domain that is coded; log if not given, both with --method auto
     #[arg(long, value_enum)]
     transfer: Option<Domain>,
     /// Offset of the logarithm; a thousandth of the mean if not given
-    #[arg(long, value_parser = parse_positive)]
+    #[arg(long, value_parser = positive)]
     offset: Option<f64>,
     /// How the material is stored
     #[arg(long, value_enum, default_value = "sparse-ensemble")]
@@ -218,7 +219,7 @@ impl Told {
     }
 }
 
-impl EncodeArgs {
+impl Arguments {
     /// Refuses options that do not go together, before any data are read.
     fn check(&self) -> Result<()> {
         let usage = |text: &str| Err(ToolError::Usage(text.into()));
@@ -293,7 +294,7 @@ impl EncodeArgs {
 ///
 /// # Errors
 /// If options do not fit, data cannot be read, or the goal not be reached.
-pub fn encode(args: &EncodeArgs) -> Result<u8> {
+pub fn run(args: &Arguments) -> Result<u8> {
     args.check()?;
     args.threads.apply();
     let data = Dataset::open(&args.dataset)?;
@@ -302,7 +303,7 @@ pub fn encode(args: &EncodeArgs) -> Result<u8> {
         tempfile::Builder::new().prefix(".selvedge-").tempdir_in(beside).map_err(ToolError::io(beside))?;
     let progress = Progress::new();
     let coarser = pyramid::levels(&data, args.levels as usize, temporary.path())?;
-    progress.tell("coarser levels", 1, 1);
+    progress.report("coarser levels", 1, 1);
     let transfer = args.transfer.unwrap_or(Domain::Log);
     let best = match args.method {
         Method::SparseEnsemble => {
@@ -332,7 +333,7 @@ pub fn encode(args: &EncodeArgs) -> Result<u8> {
 
 /// Every method in the domains that are asked for; the best for the user's preference among those that reach
 /// the goal.
-fn choose(args: &EncodeArgs, data: &Dataset, coarser: &[Dataset], progress: &Progress) -> Result<Attempt> {
+fn choose(args: &Arguments, data: &Dataset, coarser: &[Dataset], progress: &Progress) -> Result<Attempt> {
     let transfers = args.transfer.map_or(vec![Domain::Log, Domain::Linear], |one| vec![one]);
     let mut reached = Vec::new();
     let mut failed = Vec::new();
@@ -373,14 +374,14 @@ fn choose(args: &EncodeArgs, data: &Dataset, coarser: &[Dataset], progress: &Pro
 }
 
 fn by_tensor(
-    args: &EncodeArgs,
+    args: &Arguments,
     data: &Dataset,
     coarser: &[Dataset],
     transfer: Domain,
     progress: &Progress,
 ) -> Result<Attempt> {
     let goal = args.goal(transfer, data)?;
-    let tell = |what: &str, done, all| progress.tell(what, done, all);
+    let tell = |what: &str, done, all| progress.report(what, done, all);
     tell("components", 0, 1);
     let components = pca::pca_within(
         data,
@@ -459,7 +460,7 @@ fn by_tensor(
 
 /// One file for each edge; an edge of zero lets the driver choose.
 fn by_ensemble(
-    args: &EncodeArgs,
+    args: &Arguments,
     data: &Dataset,
     coarser: &[Dataset],
     transfer: Domain,
@@ -471,7 +472,7 @@ fn by_ensemble(
         _ => sparse_tensor::encode::transfer_of(data, transfer.of_components()),
     };
     let levels: Vec<&Dataset> = std::iter::once(data).chain(coarser).collect();
-    let prepared = prepare(levels, model, &|done, all| progress.tell("means and bases", done, all))?;
+    let prepared = prepare(levels, model, &|done, all| progress.report("means and bases", done, all))?;
     let dictionary = args
         .dictionary
         .as_deref()
@@ -511,7 +512,7 @@ fn by_ensemble(
             }
         };
         let verified = encode_verified(&prepared, &ensembles, args.wish(), &options, &|event| match event {
-            Event::Pass(what, done, all) => progress.tell(what, done, all),
+            Event::Pass(what, done, all) => progress.report(what, done, all),
             Event::Attempt(..) => progress.clear(),
         });
         all.push(verified.map(|verified| of_ensemble(verified, transfer, &prepared)));

@@ -1,0 +1,3 @@
+//! Encoding: a dataset becomes a file that meets a goal.
+
+pub mod parse;
