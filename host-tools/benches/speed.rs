@@ -9,7 +9,7 @@ use selvedge_tools::data::dataset::{Dataset, Sample};
 use selvedge_tools::format::model::{MaterialModel, TransferModel};
 use selvedge_tools::format::write;
 use selvedge_tools::math::random::Random;
-use selvedge_tools::methods::sparse_ensemble::encode::{Goal, Options, encode, prepare};
+use selvedge_tools::methods::sparse_ensemble::encode::{Criterion, Options, encode, prepare};
 use selvedge_tools::methods::sparse_ensemble::sparsebtf;
 use selvedge_tools::synth::{Mesostructure, Request, synthesise};
 use std::hint::black_box;
@@ -115,7 +115,7 @@ fn encoded(folder: &Path, met: [usize; 3]) {
     // A sample meets (1 + 1/edge)^2 blocks in the mean.
     let blocks = (1.0 + 1.0 / EDGE as f64).powi(2);
     let counts = met.map(|n| (n as f64 / blocks).ceil() as usize);
-    let options = Options { edge: EDGE, goal: Goal::Coefficients(counts), ..Options::default() };
+    let options = Options { edge: EDGE, criterion: Criterion::Coefficients(counts), ..Options::default() };
     let encoded = encode(&prepared, &prepared.own_ensembles(EDGE), &options, &|_, _| ()).expect("encoded");
     let material = selvedge::open(&encoded.bytes, &Limits::NONE).expect("legal");
     let queries = queries(9);

@@ -14,7 +14,8 @@ use selvedge_tools::format::model::MaterialModel;
 use selvedge_tools::math::random::Random;
 use selvedge_tools::measure::baseline::pca::{Domain, pca};
 use selvedge_tools::methods::sparse_tensor::encode::fit::{Shape, Training};
-use selvedge_tools::methods::sparse_tensor::encode::{Goal, Options, encode};
+use selvedge_tools::encode::goal::Target;
+use selvedge_tools::methods::sparse_tensor::encode::{Options, encode};
 use selvedge_tools::synth::{Mesostructure, Request, synthesise};
 use std::hint::black_box;
 use std::time::Instant;
@@ -144,7 +145,7 @@ fn measure(data: &Dataset, light_atoms: usize, abrdf_atoms: usize) {
     let components = pca(data, Domain::Linear, 160).expect("data");
     let shape = Shape { light_atoms, abrdf_atoms, entries: 9, coefficients: 11 };
     let training = Training { iterations: 6, rounds: 1, seed: 1 };
-    let options = Options { shape, goal: Goal::All, value_bits: Some(7), training };
+    let options = Options { shape, target: Target::AsGiven, value_bits: Some(7), training };
     let encoded = encode(&components, &[], &options, |_, _, _| ()).expect("encoded");
     let material = selvedge::open(&encoded.bytes, &Limits::NONE).expect("legal");
     let floats = Floats::new(&encoded.model);

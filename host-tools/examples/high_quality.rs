@@ -15,7 +15,7 @@ use selvedge_tools::error::{Result, ToolError};
 use selvedge_tools::format::model::TransferModel;
 use selvedge_tools::measure::compare::{Source, compare_every};
 use selvedge_tools::methods::sparse_ensemble::encode::candidates::{Keep, collect};
-use selvedge_tools::methods::sparse_ensemble::encode::{Goal, Options, encode, prepare};
+use selvedge_tools::methods::sparse_ensemble::encode::{Criterion, Options, encode, prepare};
 use std::path::Path;
 
 /// Texels along the side of a block in the published layout.
@@ -63,7 +63,7 @@ fn run(path: &Path, edge: usize, thresholds: &[f64]) -> Result<()> {
     );
     println!("|---:|---:|---:|---:|---:|---:|---:|---:|---:|");
     for &threshold in thresholds {
-        let options = Options { edge, goal: Goal::Threshold(threshold), ..Options::default() };
+        let options = Options { edge, criterion: Criterion::Threshold(threshold), ..Options::default() };
         let encoded = encode(&prepared, &ensembles, &options, &|_, _| ())?;
         let file = selvedge::open(&encoded.bytes, &Limits::NONE)
             .map_err(|finding| ToolError::Mismatch(format!("a file just written: {finding}")))?;

@@ -13,7 +13,7 @@ use selvedge_tools::format::model::TransferModel;
 use selvedge_tools::measure::baseline::pca::{self, Choice};
 use selvedge_tools::measure::baseline::published::Published;
 use selvedge_tools::measure::compare::{Metrics, Source, compare};
-use selvedge_tools::methods::sparse_ensemble::encode::{Encoded, Goal, Options, encode, prepare};
+use selvedge_tools::methods::sparse_ensemble::encode::{Criterion, Encoded, Options, encode, prepare};
 use std::path::Path;
 
 /// Edges of blocks that are tried.
@@ -87,11 +87,11 @@ fn ours(dataset: &Dataset, budgets: &[u64]) -> Result<Vec<Ours>> {
         for edge in EDGES {
             // Ours: everything that a file is made with is set here.
             let ensembles = prepared.own_ensembles(edge);
-            let options = Options { edge, goal: Goal::Size(budget), ..Options::default() };
+            let options = Options { edge, criterion: Criterion::Bytes(budget), ..Options::default() };
             let encoded = match encode(&prepared, &ensembles, &options, &|_, _| ()) {
                 Ok(encoded) => encoded,
-                Err(ToolError::Usage(why)) => {
-                    eprintln!("{budget} bytes, edge {edge}: {why}");
+                Err(error @ ToolError::Unreachable { .. }) => {
+                    eprintln!("{budget} bytes, edge {edge}: {error}");
                     continue;
                 }
                 Err(error) => return Err(error),

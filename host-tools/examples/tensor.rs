@@ -8,11 +8,12 @@
 
 use selvedge::Limits;
 use selvedge_tools::data::dataset::Dataset;
+use selvedge_tools::encode::goal::Target;
 use selvedge_tools::error::{Result, ToolError};
 use selvedge_tools::measure::baseline::pca::{Domain, pca};
 use selvedge_tools::measure::compare::{Source, compare};
 use selvedge_tools::methods::sparse_tensor::encode::fit::{Shape, Training, fit};
-use selvedge_tools::methods::sparse_tensor::encode::{Goal, Options, encode_fit};
+use selvedge_tools::methods::sparse_tensor::encode::{Options, encode_fit};
 use std::path::Path;
 use std::time::Instant;
 
@@ -58,7 +59,7 @@ fn main() -> Result<()> {
             &components,
             &fitted,
             &[],
-            &Options { shape, goal: Goal::All, value_bits: None, training: Training::default() },
+            &Options { shape, target: Target::AsGiven, value_bits: None, training: Training::default() },
         )?;
         let file =
             selvedge::open(&encoded.bytes, &Limits::NONE).unwrap_or_else(|finding| panic!("{finding}"));
@@ -82,11 +83,11 @@ fn main() -> Result<()> {
         });
         let mean = encoded.coefficients as f64 / data.description().texels() as f64;
         println!(
-            "  {} bytes, error {error:.5} (predicted {:.5}), {mean:.2} coefficients a texel of {} bits, {} limited, {} operations, {:.1} s; components {rival}",
+            "  {} bytes, error {error:.5} (predicted {:.5}), {mean:.2} coefficients a texel of {} bits, {} clipped, {} operations, {:.1} s; components {rival}",
             encoded.bytes.len(),
             encoded.predicted_rms,
             encoded.model.tensor.as_ref().map_or(0, |t| t.lists[0][0].value_bits),
-            encoded.limited,
+            encoded.clipped,
             file.header().operations,
             start.elapsed().as_secs_f64()
         );

@@ -8,12 +8,20 @@ pub enum ToolError {
     /// The command line does not make sense.
     #[error("{0}")]
     Usage(String),
+    /// A goal that a method cannot reach, though its options make sense; another method may.
+    #[error("{goal} cannot be reached: {least}")]
+    Unreachable {
+        /// What was asked for.
+        goal: String,
+        /// The nearest that was or can be reached, or why it is none.
+        least: String,
+    },
     /// Reading or writing failed.
     #[error("{path}: {source}")]
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
     /// A Selvedge file breaks a rule.
@@ -24,7 +32,7 @@ pub enum ToolError {
         /// The first broken rule.
         finding: selvedge::Finding,
     },
-    /// A foreign file is not what its layout says.
+    /// A third-party file breaks its layout.
     #[error("{path}, byte {offset}: {what}")]
     Foreign {
         /// The file.
@@ -39,7 +47,7 @@ pub enum ToolError {
     Picture {
         /// The file.
         path: PathBuf,
-        /// What the library said.
+        /// The library's message.
         what: String,
     },
     /// Two materials cannot be compared: their sizes or directions differ.
@@ -59,10 +67,10 @@ impl ToolError {
         move |source| ToolError::Io { path: path.to_owned(), source }
     }
 
-    /// The program's exit code: 1 usage, 2 I/O, 3 invalid, 4 over limits, 5 unsupported.
+    /// The program's exit code: 1 usage or a goal out of reach, 2 I/O, 3 invalid, 4 over limits, 5 unsupported.
     pub fn exit_code(&self) -> u8 {
         match self {
-            ToolError::Usage(_) => 1,
+            ToolError::Usage(_) | ToolError::Unreachable { .. } => 1,
             ToolError::Io { .. } => 2,
             ToolError::Foreign { .. }
             | ToolError::Picture { .. }

@@ -5,6 +5,9 @@ use std::io::{Read as _, Write as _};
 use std::path::Path;
 
 /// A whole file; `-` is standard input.
+///
+/// # Errors
+/// [`ToolError::Io`] if it cannot be read.
 pub fn read(path: &Path) -> Result<Vec<u8>> {
     if path == Path::new("-") {
         let mut bytes = Vec::new();
@@ -15,6 +18,9 @@ pub fn read(path: &Path) -> Result<Vec<u8>> {
 }
 
 /// Writes beside the file, then renames: nobody ever sees half of it. `-` is standard output.
+///
+/// # Errors
+/// [`ToolError::Io`] if it cannot be written; the old file is then as it was.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     if path == Path::new("-") {
         let mut out = std::io::stdout().lock();
@@ -46,6 +52,9 @@ pub fn folder_of(path: &Path) -> &Path {
 }
 
 /// Reads at an offset, without a cursor that threads would share.
+///
+/// # Errors
+/// If the file ends before all bytes are read, or the system refuses.
 pub fn read_exact_at(file: &std::fs::File, bytes: &mut [u8], offset: u64) -> std::io::Result<()> {
     #[cfg(unix)]
     return std::os::unix::fs::FileExt::read_exact_at(file, bytes, offset);
@@ -63,6 +72,9 @@ pub fn read_exact_at(file: &std::fs::File, bytes: &mut [u8], offset: u64) -> std
 }
 
 /// Writes at an offset, without a cursor that threads would share.
+///
+/// # Errors
+/// If the system refuses.
 pub fn write_all_at(file: &std::fs::File, bytes: &[u8], offset: u64) -> std::io::Result<()> {
     #[cfg(unix)]
     return std::os::unix::fs::FileExt::write_all_at(file, bytes, offset);
@@ -79,7 +91,10 @@ pub fn write_all_at(file: &std::fs::File, bytes: &[u8], offset: u64) -> std::io:
     }
 }
 
-/// Puts a file that was written beside its place there.
+/// Renames a finished temporary file to its path.
+///
+/// # Errors
+/// [`ToolError::Io`] if the system refuses.
 pub fn persist(beside: tempfile::NamedTempFile, path: &Path) -> Result<()> {
     // A temporary file is private; a result has the permissions that a new file would have.
     #[cfg(unix)]

@@ -6,14 +6,18 @@ use selvedge::{Limits, Selvedge};
 use selvedge_tools::data::dataset::{Dataset, Description, Sample, Writer};
 use selvedge_tools::data::directions;
 use selvedge_tools::data::pyramid;
+use selvedge_tools::encode::goal::{Goal, Verified};
+use selvedge_tools::error::ToolError;
 use selvedge_tools::format::model::{MetadataModel, TransferModel};
 use selvedge_tools::format::write;
 use selvedge_tools::math::random::Random;
+use selvedge_tools::measure::baseline::pca::Domain;
 use selvedge_tools::measure::compare::{Metrics, Source, compare};
 use selvedge_tools::methods::sparse_ensemble::dictionary_file::{self, Training};
-use selvedge_tools::methods::sparse_ensemble::encode::driver::{Verified, Wish, encode_verified};
-use selvedge_tools::methods::sparse_ensemble::encode::{Goal, Options, encode, prepare};
+use selvedge_tools::methods::sparse_ensemble::encode::verified::encode_verified;
+use selvedge_tools::methods::sparse_ensemble::encode::{Criterion, Encoded, Options, encode, prepare};
 use selvedge_tools::methods::sparse_ensemble::train::{self, train};
+use selvedge_tools::progress::Quiet;
 use std::path::Path;
 
 /// A small material with texture, relief and a highlight, of any size and number of directions.
@@ -68,9 +72,9 @@ fn measured(data: &Dataset, bytes: &[u8]) -> Metrics {
     .expect("alike")
 }
 
-fn verified(data: &Dataset, wish: Wish, options: &Options) -> Verified {
+fn verified(data: &Dataset, goal: Goal, options: &Options) -> Verified<Encoded> {
     let prepared = prepare(vec![data], transfer(data), &|_, _| ()).expect("readable");
-    encode_verified(&prepared, &|edge| prepared.own_ensembles(edge), wish, options, &|_| ())
+    encode_verified(&prepared, &|edge| prepared.own_ensembles(edge), goal, options, &Quiet)
         .expect("reachable")
 }
 
@@ -109,7 +113,7 @@ fn threads_change_no_byte() {
         let trained =
             train(&[&data], &small_training(), None, &mut |_| true).expect("trained").expect("not stopped");
         let prepared = prepare(vec![&data], transfer(&data), &|_, _| ()).expect("readable");
-        let options = Options { edge: 4, goal: Goal::Rms(0.1), layers: 2, ..Options::default() };
+        let options = Options { edge: 4, criterion: Criterion::Rms(0.1), layers: 2, ..Options::default() };
         let encoded = encode(&prepared, &trained.ensembles, &options, &|_, _| ()).expect("encoded");
         (dictionary_bytes(&data, &trained, small_training()), encoded.bytes)
     };
@@ -187,14 +191,14 @@ fn goals_hold_as_decoded() {
     let data = material(&folder.path().join("a"), [24, 20], 19, 1.0, 4);
     for edge in [0, 1, 3, 10] {
         let options = Options { edge, ..Options::default() };
-        let v = verified(&data, Wish::LogRms(0.15), &options);
+        let v = verified(&data, Goal::Error(Domain::Log, 0.15), &options);
         let found = measured(&data, &v.encoded.bytes);
         assert!(found.log_rms <= 0.15 && found.log_rms > 0.13, "edge {edge}: {}", found.log_rms);
         assert!(
             (v.encoded.predicted_rms - found.log_rms).abs() < 0.03 * found.log_rms || 24 % edge.max(1) != 0,
             "edge {edge}"
         );
-        let v = verified(&data, Wish::Size(16_000), &options);
+        let v = verified(&data, Goal::Bytes(16_000), &options);
         assert!(
             v.encoded.bytes.len() <= 16_000 && v.encoded.bytes.len() > 15_500,
             "edge {edge}: {}",
@@ -202,15 +206,16 @@ fn goals_hold_as_decoded() {
         );
     }
     let options = Options { edge: 4, ..Options::default() };
-    let v = verified(&data, Wish::LinearRms(0.02), &options);
+    let v = verified(&data, Goal::Error(Domain::Linear, 0.02), &options);
     assert!(measured(&data, &v.encoded.bytes).linear_rms <= 0.02);
-    let v = verified(&data, Wish::Psnr(35.0), &options);
+    let v = verified(&data, Goal::Psnr(35.0), &options);
     assert!(measured(&data, &v.encoded.bytes).psnr_db >= 35.0);
-    let free = verified(&data, Wish::Size(16_000), &options);
+    let free = verified(&data, Goal::Bytes(16_000), &options);
     let cap = free.operations / 2;
-    let capped = verified(&data, Wish::Size(16_000), &Options { operations: Some(cap), ..options.clone() });
+    let capped = verified(&data, Goal::Bytes(16_000), &Options { operations: Some(cap), ..options.clone() });
     assert!(capped.operations <= cap && capped.encoded.bytes.len() <= 16_000, "{} {cap}", capped.operations);
-    let v = verified(&data, Wish::Coefficients([9, 4, 2]), &options);
+    let counts = Options { criterion: Criterion::Coefficients([9, 4, 2]), ..options };
+    let v = verified(&data, Goal::AsGiven, &counts);
     assert_eq!(v.encoded.coefficients, [9 * 30, 4 * 30, 2 * 30]);
 }
 
@@ -221,7 +226,7 @@ fn layers_and_levels_are_coarser_files() {
     let coarser = pyramid::levels(&data, 3, folder.path()).expect("levels");
     let levels: Vec<&Dataset> = std::iter::once(&data).chain(&coarser).collect();
     let prepared = prepare(levels, transfer(&data), &|_, _| ()).expect("readable");
-    let options = Options { edge: 4, goal: Goal::Rms(0.08), layers: 3, ..Options::default() };
+    let options = Options { edge: 4, criterion: Criterion::Rms(0.08), layers: 3, ..Options::default() };
     let encoded = encode(&prepared, &prepared.own_ensembles(4), &options, &|_, _| ()).expect("encoded");
     let file = open(&encoded.bytes);
     assert_eq!((file.header().layer_count, file.header().level_count), (3, 3));
@@ -259,7 +264,7 @@ fn trained_dictionaries_serve_unseen_materials_inside_and_beside_the_file() {
     let prepared = prepare(vec![&unseen], transfer(&unseen), &|_, _| ()).expect("readable");
     for edge in [4, 5] {
         let ensembles = dictionary.ensembles.each_ref().map(|e| e.with_edge(edge));
-        let options = Options { edge, goal: Goal::Rms(0.12), ..Options::default() };
+        let options = Options { edge, criterion: Criterion::Rms(0.12), ..Options::default() };
         let inside = encode(&prepared, &ensembles, &options, &|_, _| ()).expect("encoded");
         let options = Options { external: Some(bytes.as_slice().into()), ..options };
         let beside = encode(&prepared, &ensembles, &options, &|_, _| ()).expect("encoded");
@@ -296,7 +301,8 @@ fn odd_materials_become_correct_files() {
                 .unwrap_or_else(|error| panic!("{name}: {error}"));
             let ensembles = |edge| prepared.own_ensembles(edge);
             let options = Options { edge, ..Options::default() };
-            let verified = encode_verified(&prepared, &ensembles, Wish::LogRms(0.05), &options, &|_| ());
+            let verified =
+                encode_verified(&prepared, &ensembles, Goal::Error(Domain::Log, 0.05), &options, &Quiet);
             let verified = verified.unwrap_or_else(|error| panic!("{name}, edge {edge}: {error}"));
             let found = measured(&data, &verified.encoded.bytes).log_rms;
             assert!(found <= 0.05, "{name}, edge {edge}: {found}");
@@ -317,7 +323,7 @@ fn odd_materials_become_correct_files() {
     (0..36).for_each(|texel| writer.put(texel, 0, &[0.25, 0.5, 0.75]).expect("put"));
     writer.finish().expect("finished");
     let data = Dataset::open(&path).expect("opened");
-    let v = verified(&data, Wish::LogRms(0.01), &Options { edge: 4, ..Options::default() });
+    let v = verified(&data, Goal::Error(Domain::Log, 0.01), &Options { edge: 4, ..Options::default() });
     assert!(measured(&data, &v.encoded.bytes).log_rms < 1e-4);
     assert_eq!(v.encoded.coefficients, [0; 3]);
 }
@@ -351,17 +357,17 @@ fn stiff_values_are_coded_in_both_domains() {
     }
     writer.finish().expect("finished");
     let data = Dataset::open(&path).expect("opened");
-    let v = verified(&data, Wish::LogRms(0.05), &Options { edge: 2, ..Options::default() });
+    let v = verified(&data, Goal::Error(Domain::Log, 0.05), &Options { edge: 2, ..Options::default() });
     assert!(measured(&data, &v.encoded.bytes).log_rms <= 0.05);
     let exponent = data.statistics().largest.log2().ceil() as i32 - 4;
     let prepared = prepare(vec![&data], TransferModel::Linear { exponent }, &|_, _| ()).expect("readable");
-    let wish = Wish::LinearRms(1.0);
+    let goal = Goal::Error(Domain::Linear, 1.0);
     let linear = encode_verified(
         &prepared,
         &|edge| prepared.own_ensembles(edge),
-        wish,
+        goal,
         &Options { edge: 2, ..Options::default() },
-        &|_| (),
+        &Quiet,
     )
     .expect("reachable");
     assert!(measured(&data, &linear.encoded.bytes).linear_rms <= 1.0);
@@ -376,10 +382,11 @@ fn goals_that_cannot_be_reached_are_refused() {
         encode(&prepared, &prepared.own_ensembles(options.edge), &options, &|_, _| ())
             .map(|e| write::write_material(&e.model))
     };
-    let few = run(Options { edge: 4, goal: Goal::Size(100), ..Options::default() })
-        .expect_err("too small")
-        .to_string();
-    assert!(few.contains("too few"), "{few}");
-    let cap = Options { edge: 4, goal: Goal::Rms(0.1), operations: Some(10), ..Options::default() };
-    assert!(run(cap).expect_err("too few").to_string().contains("operations are too few"));
+    let few = run(Options { edge: 4, criterion: Criterion::Bytes(100), ..Options::default() })
+        .expect_err("too small");
+    assert!(matches!(few, ToolError::Unreachable { .. }) && few.to_string().contains("too few"), "{few}");
+    let cap = Options { edge: 4, criterion: Criterion::Rms(0.1), operations: Some(10), ..Options::default() };
+    let capped = run(cap).expect_err("too few");
+    let words = capped.to_string();
+    assert!(matches!(capped, ToolError::Unreachable { .. }) && words.contains("a cap of 10"), "{words}");
 }

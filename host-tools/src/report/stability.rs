@@ -16,6 +16,7 @@ use crate::math::linear::{eigenbasis, nearest_orthogonal, orthonormal, product_a
 use crate::math::random::Random;
 use crate::measure::baseline::pca::{Domain, pca};
 use crate::measure::compare::{Source, compare, query};
+use crate::encode::goal::Target;
 use crate::methods::sparse_ensemble::encode::{self, prepare};
 use crate::methods::sparse_tensor;
 use crate::methods::sparse_tensor::encode::fit;
@@ -898,7 +899,7 @@ fn encoded(data: &Dataset, method: Method, domain: Domain) -> Result<(Vec<u8>, f
         let shape = fit::Shape { light_atoms: 12, abrdf_atoms: 24, entries: 6, coefficients: 8 };
         let options = sparse_tensor::encode::Options {
             shape,
-            goal: sparse_tensor::encode::Goal::All,
+            target: Target::AsGiven,
             value_bits: Some(12),
             training: fit::Training { iterations: 6, rounds: 2, seed: 1 },
         };
@@ -908,7 +909,7 @@ fn encoded(data: &Dataset, method: Method, domain: Domain) -> Result<(Vec<u8>, f
     let prepared = prepare(vec![data], sparse_tensor::encode::transfer_of(data, domain), &|_, _| ())?;
     let options = encode::Options {
         edge: 4,
-        goal: encode::Goal::Coefficients([60, 30, 30]),
+        criterion: encode::Criterion::Coefficients([60, 30, 30]),
         ..encode::Options::default()
     };
     let made = encode::encode(&prepared, &prepared.own_ensembles(4), &options, &|_, _| ())?;

@@ -9,7 +9,7 @@ use crate::measure::baseline::decoder::{Decoder, Locator};
 use crate::measure::baseline::pca::{Domain, pca};
 use crate::measure::baseline::{clusters, published, tucker};
 use crate::measure::speed::{self, Adapter};
-use crate::methods::sparse_ensemble::encode::driver::open_made;
+use crate::encode::goal::{Target, open_made};
 use crate::methods::sparse_ensemble::encode::{self, prepare};
 use crate::methods::sparse_tensor;
 use crate::methods::sparse_tensor::encode::fit;
@@ -97,12 +97,12 @@ fn name_of(domain: Domain) -> &'static str {
     if domain == Domain::Log { "log" } else { "linear" }
 }
 
-/// A budget that a method cannot keep is no failure of the report: it is said, and left out.
+/// Budgets that a method cannot meet are logged and skipped.
 fn kept<T>(result: Result<T>, what: &str, visitor: &Visitor<'_>) -> Result<Option<T>> {
     match result {
         Ok(made) => Ok(Some(made)),
-        Err(ToolError::Usage(why)) => {
-            (visitor.say)(&format!("{what}: left out, {why}"));
+        Err(error @ ToolError::Unreachable { .. }) => {
+            (visitor.say)(&format!("{what}: left out, {error}"));
             Ok(None)
         }
         Err(error) => Err(error),
@@ -130,7 +130,7 @@ fn ensembles(
             (visitor.say)(&format!("{} at {budget} bytes", method(edge)));
             let begun = Instant::now();
             let options =
-                encode::Options { edge, goal: encode::Goal::Size(budget), ..encode::Options::default() };
+                encode::Options { edge, criterion: encode::Criterion::Bytes(budget), ..encode::Options::default() };
             let Some(encoded) =
                 kept(encode::encode(&prepared, &bases, &options, &|_, _| ()), &method(edge), visitor)?
             else {
@@ -198,14 +198,14 @@ fn components(
         (visitor.say)(&format!("{of_tensor}: trial dictionaries"));
         let begun = Instant::now();
         let training = fit::Training::default();
-        let trials = sparse_tensor::encode::Trials::new(&whole, training, |_, _, _| ());
+        let trials = sparse_tensor::encode::ShapeSearch::new(&whole, training, |_, _, _| ());
         let shared = shared + begun.elapsed().as_secs_f64();
         for budget in wanted {
             (visitor.say)(&format!("{of_tensor} at {budget} bytes"));
             let begun = Instant::now();
-            let goal = sparse_tensor::encode::Goal::Size(budget);
+            let target = Target::Bytes(budget);
             let Some((shape, _, encoded)) =
-                kept(trials.encode(&[], goal, None, training, |_, _, _| ()), &of_tensor, visitor)?
+                kept(trials.encode(&[], target, None, training, |_, _, _| ()), &of_tensor, visitor)?
             else {
                 continue;
             };
@@ -411,7 +411,7 @@ fn split(set: &[glam::DVec3]) -> [Vec<usize>; 2] {
 fn finder(data: &Dataset) -> Result<Vec<u8>> {
     let prepared = prepare(vec![data], sparse_tensor::encode::transfer_of(data, Domain::Log), &|_, _| ())?;
     let options =
-        encode::Options { edge: 8, goal: encode::Goal::Coefficients([1; 3]), ..encode::Options::default() };
+        encode::Options { edge: 8, criterion: encode::Criterion::Coefficients([1; 3]), ..encode::Options::default() };
     Ok(encode::encode(&prepared, &prepared.own_ensembles(8), &options, &|_, _| ())?.bytes)
 }
 

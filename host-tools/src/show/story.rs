@@ -9,8 +9,10 @@ use crate::files;
 use crate::format::model::{MetadataModel, TransferModel};
 use crate::measure::compare::{self, Source};
 use crate::methods::sparse_ensemble::dictionary_file::{self, Training};
-use crate::methods::sparse_ensemble::encode::driver::{Event, Verified, Wish, encode_verified};
-use crate::methods::sparse_ensemble::encode::{Options, prepare};
+use crate::encode::goal::{Goal, Verified};
+use crate::methods::sparse_ensemble::encode::verified::encode_verified;
+use crate::methods::sparse_ensemble::encode::{Encoded, Options, prepare};
+use crate::progress::Quiet;
 use crate::methods::sparse_ensemble::train;
 use crate::show::ball::render_ball;
 use crate::synth::{Mesostructure, Request, synthesise};
@@ -101,15 +103,14 @@ pub fn tell(out: &Path, say: &mut dyn FnMut(String)) -> Result<Story> {
     let prepared = prepare(levels, transfer, &|_, _| ())?;
     let raw = cloth.description().half_bytes();
     let options = Options { layers: 2, ..Options::default() };
-    let quiet = |_: Event<'_>| ();
     let mut rows = String::new();
     let mut written = Vec::new();
-    let mut row = |name: &str, verified: &Verified, say: &mut dyn FnMut(String)| {
+    let mut row = |name: &str, verified: &Verified<Encoded>, say: &mut dyn FnMut(String)| {
         let (bytes, metrics) = (verified.encoded.bytes.len(), &verified.metrics);
         let ratio = raw as f64 / bytes as f64;
         say(format!(
             "encoded cloth, {name}: {bytes} bytes ({ratio:.0}:1), blocks of {edge} x {edge}, log RMS {log:.4}, linear RMS {linear:.5}, {operations} operations",
-            edge = verified.edge,
+            edge = verified.encoded.model.edge,
             log = metrics.log_rms,
             linear = metrics.linear_rms,
             operations = verified.operations
@@ -117,23 +118,23 @@ pub fn tell(out: &Path, say: &mut dyn FnMut(String)) -> Result<Story> {
         let _ = writeln!(
             rows,
             "<tr><td>{name}</td><td>{bytes}</td><td>{ratio:.0}:1</td><td>{}</td><td>{:.4}</td><td>{:.5}</td><td>{:.2}</td><td>{}</td></tr>",
-            verified.edge, metrics.log_rms, metrics.linear_rms, metrics.psnr_db, verified.operations
+            verified.encoded.model.edge, metrics.log_rms, metrics.linear_rms, metrics.psnr_db, verified.operations
         );
     };
     for ratio in RATIOS {
         let verified = encode_verified(
             &prepared,
             &|edge| prepared.own_ensembles(edge),
-            Wish::Size(raw / ratio),
+            Goal::Bytes(raw / ratio),
             &options,
-            &quiet,
+            &Quiet,
         )?;
         row("own columns", &verified, say);
         written.push((out.join(format!("cloth-{ratio}.selv")), verified.encoded.bytes));
     }
     let ensembles = |edge: usize| dictionary.ensembles.each_ref().map(|e| e.with_edge(edge));
     let options = Options { edge: 4, ..options };
-    let verified = encode_verified(&prepared, &ensembles, Wish::Size(raw / TRAINED_RATIO), &options, &quiet)?;
+    let verified = encode_verified(&prepared, &ensembles, Goal::Bytes(raw / TRAINED_RATIO), &options, &Quiet)?;
     row("columns trained on knit and tissue", &verified, say);
     written.push((out.join("cloth-trained.selv"), verified.encoded.bytes));
     for (path, bytes) in &written {

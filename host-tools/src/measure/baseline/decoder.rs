@@ -293,7 +293,7 @@ mod tests {
     use crate::measure::baseline::pca::{self, Domain};
     use crate::measure::baseline::{clusters, data, published, tests::small, tucker};
     use crate::measure::compare::{Source, compare};
-    use crate::methods::sparse_ensemble::encode::{Goal, Options, encode, prepare};
+    use crate::methods::sparse_ensemble::encode::{Criterion, Options, encode, prepare};
     use selvedge::Limits;
 
     /// Every decoder gives the errors that its baseline measures in its own way, and a filtered sample is the
@@ -305,7 +305,7 @@ mod tests {
         let description = dataset.description();
         let prepared =
             prepare(vec![&dataset], TransferModel::Log2 { offset: 0.01 }, &|_, _| ()).expect("prepared");
-        let options = Options { goal: Goal::Size(8000), ..Options::default() };
+        let options = Options { criterion: Criterion::Bytes(8000), ..Options::default() };
         let bytes =
             encode(&prepared, &prepared.own_ensembles(4), &options, &|_, _| ()).expect("encoded").bytes;
         let file = selvedge::open(&bytes, &Limits::NONE).unwrap_or_else(|finding| panic!("{finding}"));

@@ -12,7 +12,7 @@ use crate::format::triangulate::project;
 use crate::format::write::{take_apart, write_dictionary};
 use crate::math::linear::{Basis, nearest_orthogonal, product_at};
 use crate::methods::sparse_ensemble::dictionary::{Ensemble, Turn};
-use crate::methods::sparse_ensemble::encode::assemble::Used;
+use crate::methods::sparse_ensemble::encode::columns::Used;
 use crate::methods::sparse_ensemble::train::{Options, Trained};
 use glam::DVec3;
 use selvedge::Limits;

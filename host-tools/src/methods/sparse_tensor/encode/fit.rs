@@ -35,9 +35,14 @@ pub struct Training {
     pub seed: u64,
 }
 
+impl Training {
+    /// As long as more of it was found to gain.
+    pub const DEFAULT: Training = Training { iterations: 12, rounds: 4, seed: 1 };
+}
+
 impl Default for Training {
     fn default() -> Training {
-        Training { iterations: 12, rounds: 4, seed: 1 }
+        Training::DEFAULT
     }
 }
 
