@@ -10,11 +10,11 @@
 use selvedge::position::axis_at_position;
 use selvedge::{Direction, FilteredQuery, Limits, Rgb, Taps};
 use selvedge_tools::data::dataset::{Dataset, Sample};
+use selvedge_tools::encode::goal::Target;
 use selvedge_tools::format::model::MaterialModel;
 use selvedge_tools::math::random::Random;
 use selvedge_tools::measure::baseline::pca::{Domain, pca};
 use selvedge_tools::methods::sparse_tensor::encode::fit::{Shape, Training};
-use selvedge_tools::encode::goal::Target;
 use selvedge_tools::methods::sparse_tensor::encode::{Options, encode};
 use selvedge_tools::synth::{Mesostructure, Request, synthesise};
 use std::hint::black_box;

@@ -67,7 +67,8 @@ impl ToolError {
         move |source| ToolError::Io { path: path.to_owned(), source }
     }
 
-    /// The program's exit code: 1 usage or a goal out of reach, 2 I/O, 3 invalid, 4 over limits, 5 unsupported.
+    /// The program's exit code: 1 usage or a goal out of reach, 2 I/O, 3 invalid, 4 over limits,
+    /// 5 unsupported.
     pub fn exit_code(&self) -> u8 {
         match self {
             ToolError::Usage(_) | ToolError::Unreachable { .. } => 1,

@@ -96,7 +96,8 @@ impl Progress {
         }
     }
 
-    /// How long each step took, and under `rest` the time after the last report: `reading 1.2 s, finishing 0.4 s`.
+    /// How long each step took, and under `rest` the time after the last report: `reading 1.2 s, finishing
+    /// 0.4 s`.
     pub fn times(&self, rest: &str) -> String {
         let Ok(state) = self.state.lock() else { return String::new() };
         let last = (rest.to_owned(), state.reported.elapsed().as_secs_f64());

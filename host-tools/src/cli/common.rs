@@ -116,7 +116,8 @@ pub fn check_output(source: &Path, output: &Path, is_folder: bool) -> Result<()>
 pub fn warn_of_triangles(path: &Path, file: &Selvedge<'_>) {
     if !read::same_triangles(file) {
         eprintln!(
-            "warning: {}: its triangulation differs from the one that this tool computes; interpolated bits may change",
+            "warning: {}: its triangulation differs from the one that this tool computes; interpolated bits may \
+             change",
             path.display()
         );
     }

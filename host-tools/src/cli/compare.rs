@@ -138,7 +138,12 @@ fn compare(args: Arguments) -> Result<u8> {
 fn text(metrics: &Metrics) -> String {
     let Place { difference, texel, light, view } = metrics.largest;
     format!(
-        "log RMS     {:.6}  of ln(x + {:e})\nlinear RMS  {:.6}\nrelative L2 {:.6}\nPSNR        {:.2} dB  against {}\nlargest     {difference} at texel ({}, {}), light {light}, view {view}\ndifferent   {} of {}\n",
+        "log RMS     {:.6}  of ln(x + {:e})\n\
+         linear RMS  {:.6}\n\
+         relative L2 {:.6}\n\
+         PSNR        {:.2} dB  against {}\n\
+         largest     {difference} at texel ({}, {}), light {light}, view {view}\n\
+         different   {} of {}\n",
         metrics.log_rms,
         metrics.log_offset,
         metrics.linear_rms,

@@ -69,8 +69,8 @@ struct Shared {
     /// Method of the file
     #[arg(long, value_parser = methods(), default_value = ENCODERS[0].method())]
     method: String,
-    /// Objective of --method auto among files that reach the goal; error if the goal is a size, bytes if it is
-    /// an error
+    /// Objective of --method auto among files that reach the goal; error if the goal is a size, bytes if it
+    /// is an error
     #[arg(long, value_enum)]
     prefer: Option<Prefer>,
     /// Budget: operations of a filtered sample that the file may state

@@ -39,6 +39,9 @@ struct Cli {
     command: Command,
 }
 
+const COMPARE_CODES: &str =
+    "Exit codes: 0 within the limits, 1 beyond --warn, 2 beyond --fail, 3 other sizes, 4 unreadable.";
+
 #[derive(Subcommand)]
 enum Command {
     /// Everything on a built-in material: files, checks, pictures and a page
@@ -56,9 +59,7 @@ enum Command {
     /// Encode a dataset for a goal in error, bytes or coefficients
     Encode(Box<encode::Arguments>),
     /// Compare two materials; exit codes as idiff: 0 same, 1 warning, 2 failure, 3 other sizes, 4 unreadable
-    #[command(
-        after_help = "Exit codes: 0 within the limits, 1 beyond --warn, 2 beyond --fail, 3 other sizes, 4 unreadable."
-    )]
+    #[command(after_help = COMPARE_CODES)]
     Compare(compare::Arguments),
     /// Remove parts that a scene does not need; the rest decodes to the same bits
     Trim(trim::Arguments),

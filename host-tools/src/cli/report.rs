@@ -21,10 +21,12 @@ pub struct Arguments {
     #[arg(long)]
     out: PathBuf,
     /// Compression ratios of the sweep: bytes of the data in binary16 over bytes of the file
-    #[arg(long, value_delimiter = ',', default_values_t = Request::default().ratios, value_parser = parse_ratio)]
+    #[arg(long, value_delimiter = ',', value_parser = parse_ratio)]
+    #[arg(default_values_t = Request::default().ratios)]
     ratios: Vec<f64>,
     /// Rank of the decompositions
-    #[arg(long, default_value_t = Request::default().rank as u16, value_parser = clap::value_parser!(u16).range(1..=2048))]
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=2048))]
+    #[arg(default_value_t = Request::default().rank as u16)]
     rank: u16,
     /// Only methods whose names contain one of these, as "linear" or "tensor,PCA"
     #[arg(long, value_delimiter = ',')]

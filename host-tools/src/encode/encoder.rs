@@ -150,8 +150,8 @@ pub trait Encoder: Sync {
     /// Encodes and verifies: a file for each setting that the method tries, in the order of trying.
     ///
     /// # Errors
-    /// If data cannot be read or hold what the method cannot, or options do not fit them. A goal that a setting
-    /// does not reach is no error here.
+    /// If data cannot be read or hold what the method cannot, or options do not fit them. A goal that a
+    /// setting does not reach is no error here.
     fn encode(
         &self,
         levels: &Levels<'_>,

@@ -27,7 +27,7 @@ pub enum Goal {
 }
 
 impl Goal {
-    /// The domain in which an error is limited, and its root mean square at most.
+    /// The domain of an error goal, and the largest root mean square that meets it.
     pub fn limit(self, data: &Dataset) -> Option<(Domain, f64)> {
         match self {
             Goal::Error(domain, rms) => Some((domain, rms)),

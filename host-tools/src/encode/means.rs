@@ -11,8 +11,8 @@ use glam::DVec3;
 /// One in Q20.
 const ONE_Q20: f64 = 1_048_576.0;
 
-/// Means of three channels, in units of the channel, over the smallest range of 16 bits that holds them (8.1),
-/// and as the decoder reads them.
+/// Means of three channels, in units of the channel, over the smallest range of 16 bits that holds them
+/// (8.1), and as the decoder reads them.
 ///
 /// # Errors
 /// [`ToolError::Usage`](crate::error::ToolError::Usage) if they are beyond the format.

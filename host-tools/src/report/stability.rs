@@ -8,6 +8,7 @@
 use crate::check::extreme::{extreme_model, extreme_tensor};
 use crate::data::dataset::{Dataset, Description, Sample};
 use crate::data::directions;
+use crate::encode::goal::Target;
 use crate::error::{Result, ToolError};
 use crate::format::triangulate::{project, triangulate};
 use crate::format::write::write_material;
@@ -16,7 +17,6 @@ use crate::math::linear::{eigenbasis, nearest_orthogonal, orthonormal, product_a
 use crate::math::random::Random;
 use crate::measure::baseline::pca::{Domain, pca};
 use crate::measure::compare::{Source, compare, query};
-use crate::encode::goal::Target;
 use crate::methods::sparse_ensemble::encode::{self, prepare};
 use crate::methods::sparse_tensor;
 use crate::methods::sparse_tensor::encode::fit;

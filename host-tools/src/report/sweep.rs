@@ -2,6 +2,7 @@
 
 use super::{Bench, HeldOut, Kind, Line, REVISION, Request, Store, Subject, forget_peak, peak_memory};
 use crate::data::dataset::{Dataset, Description, Writer};
+use crate::encode::goal::{Target, open_made};
 use crate::error::{Result, ToolError};
 use crate::files;
 use crate::measure::baseline::data::Uncompressed;
@@ -9,7 +10,6 @@ use crate::measure::baseline::decoder::{Decoder, Locator};
 use crate::measure::baseline::pca::{Domain, pca};
 use crate::measure::baseline::{clusters, published, tucker};
 use crate::measure::speed::{self, Adapter};
-use crate::encode::goal::{Target, open_made};
 use crate::methods::sparse_ensemble::encode::{self, prepare};
 use crate::methods::sparse_tensor;
 use crate::methods::sparse_tensor::encode::fit;
@@ -129,8 +129,11 @@ fn ensembles(
         for budget in visitor.budgets(&method(edge), budgets) {
             (visitor.say)(&format!("{} at {budget} bytes", method(edge)));
             let begun = Instant::now();
-            let options =
-                encode::Options { edge, criterion: encode::Criterion::Bytes(budget), ..encode::Options::default() };
+            let options = encode::Options {
+                edge,
+                criterion: encode::Criterion::Bytes(budget),
+                ..encode::Options::default()
+            };
             let Some(encoded) =
                 kept(encode::encode(&prepared, &bases, &options, &|_, _| ()), &method(edge), visitor)?
             else {
@@ -410,8 +413,11 @@ fn split(set: &[glam::DVec3]) -> [Vec<usize>; 2] {
 /// Something that finds directions: a small file of the same sets.
 fn finder(data: &Dataset) -> Result<Vec<u8>> {
     let prepared = prepare(vec![data], sparse_tensor::encode::transfer_of(data, Domain::Log), &|_, _| ())?;
-    let options =
-        encode::Options { edge: 8, criterion: encode::Criterion::Coefficients([1; 3]), ..encode::Options::default() };
+    let options = encode::Options {
+        edge: 8,
+        criterion: encode::Criterion::Coefficients([1; 3]),
+        ..encode::Options::default()
+    };
     Ok(encode::encode(&prepared, &prepared.own_ensembles(8), &options, &|_, _| ())?.bytes)
 }
 

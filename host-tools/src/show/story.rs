@@ -4,16 +4,16 @@
 use crate::data::dataset::{Dataset, Sample};
 use crate::data::picture::{Picture, beside_error};
 use crate::data::pyramid;
+use crate::encode::goal::{Goal, Verified};
 use crate::error::{Result, ToolError};
 use crate::files;
 use crate::format::model::{MetadataModel, TransferModel};
 use crate::measure::compare::{self, Source};
 use crate::methods::sparse_ensemble::dictionary_file::{self, Training};
-use crate::encode::goal::{Goal, Verified};
 use crate::methods::sparse_ensemble::encode::verified::encode_verified;
 use crate::methods::sparse_ensemble::encode::{Encoded, Options, prepare};
-use crate::progress::Quiet;
 use crate::methods::sparse_ensemble::train;
+use crate::progress::Quiet;
 use crate::show::ball::render_ball;
 use crate::synth::{Mesostructure, Request, synthesise};
 use selvedge::Limits;
@@ -118,7 +118,11 @@ pub fn tell(out: &Path, say: &mut dyn FnMut(String)) -> Result<Story> {
         let _ = writeln!(
             rows,
             "<tr><td>{name}</td><td>{bytes}</td><td>{ratio:.0}:1</td><td>{}</td><td>{:.4}</td><td>{:.5}</td><td>{:.2}</td><td>{}</td></tr>",
-            verified.encoded.model.edge, metrics.log_rms, metrics.linear_rms, metrics.psnr_db, verified.operations
+            verified.encoded.model.edge,
+            metrics.log_rms,
+            metrics.linear_rms,
+            metrics.psnr_db,
+            verified.operations
         );
     };
     for ratio in RATIOS {
@@ -134,7 +138,8 @@ pub fn tell(out: &Path, say: &mut dyn FnMut(String)) -> Result<Story> {
     }
     let ensembles = |edge: usize| dictionary.ensembles.each_ref().map(|e| e.with_edge(edge));
     let options = Options { edge: 4, ..options };
-    let verified = encode_verified(&prepared, &ensembles, Goal::Bytes(raw / TRAINED_RATIO), &options, &Quiet)?;
+    let verified =
+        encode_verified(&prepared, &ensembles, Goal::Bytes(raw / TRAINED_RATIO), &options, &Quiet)?;
     row("columns trained on knit and tissue", &verified, say);
     written.push((out.join("cloth-trained.selv"), verified.encoded.bytes));
     for (path, bytes) in &written {

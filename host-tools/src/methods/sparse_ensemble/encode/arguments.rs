@@ -10,6 +10,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 #[derive(Args)]
+// No group: its name would be that of every struct called so.
+#[group(skip)]
 #[command(next_help_heading = "Sparse ensemble options")]
 pub(super) struct Arguments {
     /// Goal: coefficients of a block in each channel, as 256,64,64

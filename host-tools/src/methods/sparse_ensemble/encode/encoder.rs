@@ -60,7 +60,7 @@ impl SparseEnsemble {
 
     /// The edge that is encoded with, 0 if it is chosen.
     fn edge(&self) -> usize {
-        // The trained spatial bases are worth more than another edge.
+        // The trained spatial bases gain more than another edge.
         let of_dictionary = self.dictionary.as_ref().map(|dictionary| dictionary.training.options.edge);
         let of_training = self.own_dictionaries.map(|_| TRAINED_EDGE);
         self.edge.or(of_training).or(of_dictionary).unwrap_or(0)

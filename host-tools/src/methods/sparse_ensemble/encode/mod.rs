@@ -3,8 +3,8 @@
 //! Two passes over the data: [`prepare`](mod@prepare) gives means and bases, [`candidates::collect`] the
 //! coefficients that may matter. The goal is then met by one threshold over all blocks, channels and levels
 //! ([`select`], searched by `search`), since with orthonormal dictionaries and channels the square of a
-//! coefficient is the error of leaving it out. [`verified`] decodes what comes out and encodes again until the
-//! goal holds; [`encoder`] is all of it behind the trait of encoders.
+//! coefficient is the error of leaving it out. [`verified`] decodes what comes out and encodes again until
+//! the goal holds; [`encoder`] is all of it behind the trait of encoders.
 
 mod arguments;
 pub mod assemble;

@@ -133,14 +133,14 @@ fn scale_of([light, view, x, y]: &[Used; 4], atom: &AtomModel) -> f64 {
         * y.scale[atom.y as usize]
 }
 
-/// Magnitudes that a record may state, with room for rounding (10.7-7 at a shift of zero).
+/// Magnitudes that a record may state, with a margin for rounding (10.7-7 at a shift of zero).
 const RECORD_SUM: f64 = 2000.0;
 
 /// Most coefficients of a record: their count has at most 15 bits (10.3-3).
 const RECORD_COUNT: usize = 32_767;
 
-/// Moves what does not fit into a record to the next layer, the smallest first, and adds layers where they run
-/// out.
+/// Moves what does not fit into a record to the next layer, the smallest first, and adds layers where they
+/// run out.
 fn spill(lists: &mut Vec<Vec<(AtomModel, f64)>>) {
     // A magnitude is rounded up to whole units, of which there are 32 in one.
     let share = |c: &(AtomModel, f64)| c.1.abs() + 1.0 / 32.0;
@@ -150,11 +150,11 @@ fn spill(lists: &mut Vec<Vec<(AtomModel, f64)>>) {
             let list = &mut lists[layer];
             list.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()).then(a.0.word().cmp(&b.0.word())));
             let mut sum = 0.0;
-            let room = list.iter().take_while(|c| {
+            let fitting = list.iter().take_while(|c| {
                 sum += share(c);
                 sum <= RECORD_SUM
             });
-            let kept = room.take(RECORD_COUNT).count().max(1);
+            let kept = fitting.take(RECORD_COUNT).count().max(1);
             let rest = list.split_off(kept);
             if layer + 1 == lists.len() {
                 lists.push(Vec::new());

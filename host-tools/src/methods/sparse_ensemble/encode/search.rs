@@ -29,7 +29,7 @@ const SECANT_DAMPING: f64 = 0.5;
 const RMS_ATTEMPTS: usize = 4;
 /// Halvings of the interval of logarithms of thresholds for an error.
 const RMS_HALVINGS: usize = 14;
-/// Error that rounding of values makes, over that of what is left out, before a file has told it.
+/// Error that rounding of values makes, over that of what is left out, before a file was measured.
 const FIRST_ROUNDING: f64 = 0.2;
 /// Growth of that share after a miss, so that the next file is on the right side.
 const ROUNDING_SPARE: f64 = 1.01;
@@ -58,9 +58,9 @@ impl<'a> Search<'a> {
         Search { prepared, ensembles, options, candidates, channels }
     }
 
-    /// Whether a dictionary has no room for another atom at a threshold.
-    pub(super) fn has_no_room(&self, threshold: f64) -> bool {
-        self.channels.iter().any(|channel| channel.has_no_room(threshold as f32, COEFFICIENT_BITS))
+    /// Whether a dictionary can hold no more atoms than it has at a threshold.
+    pub(super) fn is_full(&self, threshold: f64) -> bool {
+        self.channels.iter().any(|channel| channel.is_full(threshold as f32, COEFFICIENT_BITS))
     }
 
     /// Selections at a threshold, within the cap of operations.

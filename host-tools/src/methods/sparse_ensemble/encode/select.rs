@@ -1,5 +1,5 @@
-//! Which candidates a file keeps: those that are worth their bits, and the atoms and columns that are worth
-//! theirs.
+//! Which candidates a file keeps: those whose gain exceeds the cost of their bits, and the atoms and columns
+//! that repay theirs.
 //!
 //! A coefficient is kept if its square is above that of a threshold: for orthonormal dictionaries its square
 //! is the error that leaving it out makes. The threshold sets the price of a bit. At that price an atom has
@@ -85,7 +85,7 @@ impl<'a> Channel<'a> {
         self.keep(|value, atom| value.abs() >= threshold && alive[atom], most)
     }
 
-    /// The energy of level 0 that [`Channel::select`] loses without a limit on records, without its lists.
+    /// The energy of level 0 that [`Channel::select`] loses without a cap on records, without its lists.
     pub fn lost_at_0(&self, threshold: f32, bits: f64) -> f64 {
         let alive = self.paying(threshold, bits);
         let (Some(candidates), Some(atoms)) = (self.levels.first(), self.atoms.first()) else { return 0.0 };
@@ -97,9 +97,9 @@ impl<'a> Channel<'a> {
         (candidates.energy - kept.map(|(&value, _)| (value as f64).powi(2)).sum::<f64>()).max(0.0)
     }
 
-    /// Whether a dictionary has as many atoms at a threshold as it has room for, so that a lower one may gain
+    /// Whether a dictionary has as many atoms at a threshold as it can hold, so that a lower one may gain
     /// little.
-    pub fn has_no_room(&self, threshold: f32, bits: f64) -> bool {
+    pub fn is_full(&self, threshold: f32, bits: f64) -> bool {
         let alive = self.paying(threshold, bits);
         (0..self.dictionaries).any(|k| {
             self.keys.iter().zip(&alive).filter(|(key, alive)| **alive && key.0 as usize == k).count()
@@ -166,7 +166,7 @@ impl<'a> Channel<'a> {
         self.keep(|_, atom| alive[atom], most)
     }
 
-    /// A dictionary has room for so many atoms: the best.
+    /// Keeps the best atoms of each dictionary, as many as it can hold.
     fn limit_atoms(&self, gains: &[f64], alive: &mut [bool]) {
         for k in 0..self.dictionaries {
             let mut of_k: Vec<usize> =

@@ -1,4 +1,5 @@
-//! One threshold for all coefficients: candidates down to one that certainly meets the criterion, then the search.
+//! One threshold for all coefficients: candidates down to a threshold that meets the criterion for certain,
+//! then the search among them.
 
 use super::candidates::{Candidates, Keep, collect};
 use super::options::{COEFFICIENT_BITS, Criterion, Encoded, Options};
@@ -65,13 +66,12 @@ pub fn encode(
             Some(encoded) => return Ok(encoded),
             None if least < NO_INFORMATION => return search.at(0.0),
             // Where no atom can be added, a lower threshold adds little, and the search would not end.
-            None if least < guess * LAST_REACH && search.has_no_room(least) => {
+            None if least < guess * LAST_REACH && search.is_full(least) => {
                 return Err(ToolError::Unreachable {
                     goal: format!("this goal in blocks of {}", options.edge),
-                    least:
-                        "it needs more atoms than a dictionary has room for: choose a smaller edge or more \
+                    least: "it needs more atoms than a dictionary can hold: choose a smaller edge or more \
                             dictionaries"
-                            .into(),
+                        .into(),
                 });
             }
             None => least *= NEXT_REACH,

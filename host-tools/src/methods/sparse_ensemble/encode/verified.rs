@@ -19,7 +19,7 @@ const EDGE_OF_COUNTS: usize = 8;
 const ALLOWANCE: f64 = 1.1;
 
 /// How targets move towards an error. The prediction is near in the domain that is coded, and a file that is
-/// 3 % better than it has to be is worth another one.
+/// more than 3 % better than it has to be is followed by another attempt.
 const STEERING: Steering = Steering {
     attempts: 8,
     first: 0.997,

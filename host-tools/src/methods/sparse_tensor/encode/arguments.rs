@@ -5,10 +5,12 @@ use super::fit::Shape;
 use clap::Args;
 
 #[derive(Args)]
+// No group: its name would be that of every struct called so.
+#[group(skip)]
 #[command(next_help_heading = "Sparse tensor options")]
 pub(super) struct Arguments {
-    /// Light atoms, ABRDF atoms, entries of a fibre and coefficients of a texel, as 64,128,8,10; chosen if not
-    /// given. Alone it is the goal
+    /// Light atoms, ABRDF atoms, entries of a fibre and coefficients of a texel, as 64,128,8,10; chosen if
+    /// not given. Alone it is the goal
     #[arg(long, value_parser = shape)]
     shape: Option<Shape>,
     /// Principal components that training works in; memory grows with their number times the texels

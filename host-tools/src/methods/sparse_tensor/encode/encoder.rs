@@ -37,7 +37,7 @@ pub(super) const MEMORY: u32 = 4000;
 pub(super) const MB: usize = 1_000_000;
 
 /// How targets move towards an error. The prediction is within a few parts in a hundred, and an attempt is
-/// dear, so the first file that meets the limit is taken.
+/// expensive, so the first file that meets the limit is taken.
 const STEERING: Steering = Steering {
     attempts: 4,
     first: 1.0,

@@ -2,8 +2,8 @@
 //!
 //! The unfolded tensor is projected into the space of its leading components; K-SVD over texels gives ABRDF
 //! atoms, and K-SVD over their views, each weighted by how much its atom is used, gives light atoms. Where
-//! the paper stops, a few rounds go on: texels are coded again with the atoms as the second step left them,
-//! ABRDF atoms solved anew for these codes, and their fibres coded again.
+//! the paper stops, a few rounds follow: texels are coded again with the atoms as the second step left them,
+//! ABRDF atoms solved again for these codes, and their fibres coded again.
 
 use crate::math::ksvd::{
     Code, Found, Pursuit, Rows, code_all, code_with, first_atoms, gram, iterate, normalise,
@@ -46,7 +46,7 @@ impl Default for Training {
     }
 }
 
-/// What training found, to be told.
+/// What training found, for reports.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Trained {
     /// Atoms that were replaced, over all iterations.
@@ -164,7 +164,12 @@ fn solve_atoms(samples: &Rows, codes: &[Code], atoms: usize) -> Option<Rows> {
 }
 
 /// Decomposes the components of a dataset.
-pub fn fit(pca: &Pca<'_>, shape: Shape, training: Training, mut tell: impl FnMut(&str, usize, usize)) -> Fit {
+pub fn fit(
+    pca: &Pca<'_>,
+    shape: Shape,
+    training: Training,
+    mut report: impl FnMut(&str, usize, usize),
+) -> Fit {
     let rank = pca.rank();
     let views = pca.dataset.description().views.len();
     let samples = Rows { dim: rank, values: pca.of_texels.clone() };
@@ -174,7 +179,7 @@ pub fn fit(pca: &Pca<'_>, shape: Shape, training: Training, mut tell: impl FnMut
 
     let mut atoms = first_atoms(&samples, shape.abrdf_atoms, training.seed);
     for i in 0..training.iterations {
-        tell("ABRDF atoms", i, training.iterations);
+        report("ABRDF atoms", i, training.iterations);
         trained.add(iterate(&samples, &mut atoms, pursuit));
     }
     let mut codes = code_all(&samples, &atoms, pursuit);
@@ -194,7 +199,7 @@ pub fn fit(pca: &Pca<'_>, shape: Shape, training: Training, mut tell: impl FnMut
             ("rounds", round, 1, training.rounds + 1)
         };
         for i in 0..iterations {
-            tell(stage, begun + i, of);
+            report(stage, begun + i, of);
             trained.add(iterate(&fibres, &mut light, fibre_pursuit));
         }
         fibre_codes = code_all(&fibres, &light, fibre_pursuit);

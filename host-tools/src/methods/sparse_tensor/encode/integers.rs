@@ -11,6 +11,10 @@ use selvedge::tensor_set::{FIBRE_SUM_LIMIT, LIST_SUM_LIMIT};
 
 /// Largest entry of a light atom.
 const ENTRY: f64 = 511.0;
+/// Largest value of a fibre's entry, Q15.
+const VALUE_LIMIT: i32 = 32_767;
+/// Smallest unit of a coefficient: that of an atom which no texel uses.
+const LEAST_UNIT: f64 = 1e-30;
 /// Most of a shift.
 const SHIFT_LIMIT: i32 = 31;
 
@@ -23,9 +27,9 @@ pub struct Atoms {
     lights: Vec<[i16; 3]>,
     /// `[view][atom][entry]`: value in Q15 and index.
     fibres: Vec<(i32, u32)>,
-    /// What a coefficient of 1 in Q15 is worth, of each ABRDF atom.
+    /// Unit of a coefficient in Q15, of each ABRDF atom.
     coefficient_unit: Vec<f64>,
-    /// What an ABRDF atom of value 1 times light entry 1 is worth.
+    /// Unit of the product of a fibre's value and a light atom's entry, of each ABRDF atom.
     value_unit: Vec<f64>,
     angular_shift: Vec<u32>,
     /// Sum of an ABRDF atom's gain shift and the section's.
@@ -39,23 +43,19 @@ impl Atoms {
         let (light_atoms, atoms) = (light.count(), largest.len());
         let views = fibres.len() / atoms;
         let entries = fibres.iter().map(Vec::len).max().unwrap_or(0).max(1);
-        let index_bits = bit_length(light_atoms as u32 - 1);
-        let step = 1i32 << index_bits;
         let scales: Vec<f64> = (0..light_atoms)
             .map(|i| {
                 light.row(i).iter().fold(0.0f64, |m, &x| m.max(x.abs() as f64)).max(f64::MIN_POSITIVE.sqrt())
                     / ENTRY
             })
             .collect();
-        let lights_count = light.dim / 3;
         let quantised = |l: usize, i: usize| {
             std::array::from_fn(|c| (light.row(i)[l * 3 + c] as f64 / scales[i]).round() as i16)
         };
-        let lights: Vec<[i16; 3]> = (0..lights_count)
+        let lights: Vec<[i16; 3]> = (0..light.dim / 3)
             .flat_map(|l| (0..light_atoms).map(move |i| (l, i)))
             .map(|(l, i)| quantised(l, i))
             .collect();
-
         let mut result = Atoms {
             light_atoms,
             atoms,
@@ -68,7 +68,7 @@ impl Atoms {
             rest_shift: vec![SHIFT_LIMIT; atoms],
         };
         let top = (1 << 15) - (1 << (15 - value_bits.min(15)));
-        for atom in 0..atoms {
+        for (atom, largest) in largest.iter().enumerate() {
             let of_atom: Vec<Vec<(u32, f64)>> = (0..views)
                 .map(|view| {
                     fibres[view * atoms + atom]
@@ -77,49 +77,50 @@ impl Atoms {
                         .collect()
                 })
                 .collect();
-            let most = of_atom.iter().flatten().fold(0.0f64, |m, (_, v)| m.max(v.abs()));
-            let sum = of_atom
-                .iter()
-                .map(|fibre| fibre.iter().map(|(_, v)| v.abs()).sum::<f64>())
-                .fold(0.0, f64::max);
-            let unit = (largest[atom] / top as f64).max(1e-30);
-            result.coefficient_unit[atom] = unit;
-            if most <= 0.0 {
-                result.value_unit[atom] = 1.0;
-                continue;
-            }
-            // Rounding to the nearest multiple of the step must stay within the format.
-            let needed = (most / (32_767 - step) as f64)
-                .max(sum / (FIBRE_SUM_LIMIT as i32 - entries as i32 * step) as f64);
-            // Largest q with 2^(-q - 17) / unit >= needed.
-            let q = (-(needed * unit).log2() - 17.0).floor() as i32;
-            let value_unit = 2f64.powi(-q - 17) / unit;
-            let mut peak = 0.0f64;
-            for (view, fibre) in of_atom.iter().enumerate() {
-                let first = (view * atoms + atom) * entries;
-                let slots = &mut result.fibres[first..][..entries];
-                for (slot, &(index, value)) in slots.iter_mut().zip(fibre) {
-                    *slot = ((value / value_unit / step as f64).round() as i32 * step, index);
-                }
-                slots.sort_by_key(|&(value, index)| (value == 0, index));
-                slots.iter_mut().filter(|slot| slot.0 == 0).for_each(|slot| slot.1 = 0);
-                for l in 0..lights_count {
-                    for c in 0..3 {
-                        let sum: i64 = slots
-                            .iter()
-                            .map(|&(v, i)| v as i64 * result.lights[l * light_atoms + i as usize][c] as i64)
-                            .sum();
-                        peak = peak.max(sum.unsigned_abs() as f64);
-                    }
-                }
-            }
-            // 12.5-2 and 12.5-3: eight times the sum, shifted to 16 bits.
-            let shift = (peak * 8.0 / 32_766.0).max(1.0).log2().ceil() as i32;
-            result.value_unit[atom] = value_unit;
-            result.angular_shift[atom] = shift.clamp(0, SHIFT_LIMIT) as u32;
-            result.rest_shift[atom] = q - shift;
+            result.coefficient_unit[atom] = (largest / top as f64).max(LEAST_UNIT);
+            result.set_atom(atom, &of_atom);
         }
         result
+    }
+
+    /// Quantises the fibres of an ABRDF atom whose coefficients have their unit.
+    fn set_atom(&mut self, atom: usize, of_atom: &[Vec<(u32, f64)>]) {
+        let magnitudes = of_atom.iter().map(|fibre| fibre.iter().map(|(_, v)| v.abs()));
+        let most = magnitudes.clone().flatten().fold(0.0f64, f64::max);
+        let sum = magnitudes.map(|fibre| fibre.sum::<f64>()).fold(0.0, f64::max);
+        if most <= 0.0 {
+            self.value_unit[atom] = 1.0;
+            return;
+        }
+        let step = 1i32 << bit_length(self.light_atoms as u32 - 1);
+        let unit = self.coefficient_unit[atom];
+        // Rounding to the nearest multiple of the step must stay within the format.
+        let needed = (most / (VALUE_LIMIT - step) as f64)
+            .max(sum / (FIBRE_SUM_LIMIT as i32 - self.entries as i32 * step) as f64);
+        // Largest q with 2^(-q - 17) / unit >= needed.
+        let q = (-(needed * unit).log2() - 17.0).floor() as i32;
+        let value_unit = 2f64.powi(-q - 17) / unit;
+        let mut peak = 0.0f64;
+        for (view, fibre) in of_atom.iter().enumerate() {
+            let first = (view * self.atoms + atom) * self.entries;
+            let slots = &mut self.fibres[first..][..self.entries];
+            for (slot, &(index, value)) in slots.iter_mut().zip(fibre) {
+                *slot = ((value / value_unit / step as f64).round() as i32 * step, index);
+            }
+            slots.sort_by_key(|&(value, index)| (value == 0, index));
+            slots.iter_mut().filter(|slot| slot.0 == 0).for_each(|slot| slot.1 = 0);
+            for lights in self.lights.chunks(self.light_atoms) {
+                for c in 0..3 {
+                    let sum: i64 = slots.iter().map(|&(v, i)| v as i64 * lights[i as usize][c] as i64).sum();
+                    peak = peak.max(sum.unsigned_abs() as f64);
+                }
+            }
+        }
+        // 12.5-2 and 12.5-3: eight times the sum, shifted to 16 bits.
+        let shift = (peak * 8.0 / 32_766.0).max(1.0).log2().ceil() as i32;
+        self.value_unit[atom] = value_unit;
+        self.angular_shift[atom] = shift.clamp(0, SHIFT_LIMIT) as u32;
+        self.rest_shift[atom] = q - shift;
     }
 
     /// ABRDF atoms as the decoder has them at sample directions, but for its last roundings:

@@ -1,4 +1,4 @@
-//! Texels against atoms: products with all of them, and the lists of coefficients that are pursued from these.
+//! Texels against atoms: products with all of them, and the lists of coefficients pursued from these.
 
 use super::integers::Quantiser;
 use crate::data::dataset::Dataset;

@@ -139,9 +139,14 @@ mod tests {
         let with = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
             pool.install(|| {
-                encode(&pca(&data, Domain::Linear, 8).expect("made"), &[], &options(Target::AsGiven), |_, _, _| ())
-                    .expect("encoded")
-                    .bytes
+                encode(
+                    &pca(&data, Domain::Linear, 8).expect("made"),
+                    &[],
+                    &options(Target::AsGiven),
+                    |_, _, _| (),
+                )
+                .expect("encoded")
+                .bytes
             })
         };
         assert!(with(1) == with(2) && with(1) == with(3));

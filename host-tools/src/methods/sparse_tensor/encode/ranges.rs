@@ -12,8 +12,9 @@ use crate::math::ksvd::{Pursuit, Rows, gram};
 const PARALLEL: f64 = 1e-4;
 /// Passes over the data for the ranges of coefficients, at most.
 const MOST_PASSES: usize = 8;
-/// Bits of a value for which atoms are made at least, and those with which ranges are found: nearly unrounded.
+/// Bits of a value for which atoms are made at least.
 const ATOM_BITS: u32 = 8;
+/// Bits with which ranges are found: nearly unrounded.
 const FULL_BITS: u32 = 15;
 /// A coefficient from this part of a range on says that a larger range is needed.
 const AT_RANGE: f64 = 0.999;
@@ -43,9 +44,9 @@ impl<'a> Ranges<'a> {
     /// Those of a decomposition, with nothing left of atoms that are parallel to another one with larger
     /// coefficients.
     ///
-    /// Where one part of the data has nearly all the energy, training makes many atoms of it, which rounding may
-    /// turn in any order: which of them a texel is coded with, and how large its coefficient is then, would be
-    /// chance.
+    /// Where one part of the data has nearly all the energy, training makes many atoms of it, which rounding
+    /// may turn in any order: which of them a texel is coded with, and how large its coefficient is then,
+    /// would be chance.
     pub(super) fn without_parallels(light: &'a Rows, fitted: &Fit) -> Ranges<'a> {
         let (mut fibres, mut largest) = (fitted.fibres.clone(), fitted.largest.clone());
         let products = gram(&Atoms::new(light, &fibres, &largest, ATOM_BITS).rebuild());

@@ -76,8 +76,8 @@ impl<'a, 'd> ShapeSearch<'a, 'd> {
         ShapeSearch { pca, trials: SIZES.map(trial).into() }
     }
 
-    /// The best shape of each size of the dictionaries for a target, the best of all first, and the error that
-    /// is estimated for it.
+    /// The best shape of each size of the dictionaries for a target, the best of all first, and the error
+    /// that is estimated for it.
     ///
     /// By the estimate of Ruiters and Klein (section 4.2): errors of shorter fibres and lists are read from a
     /// decomposition as sums of those of both steps.
