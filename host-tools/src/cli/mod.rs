@@ -138,3 +138,60 @@ pub fn main() -> ExitCode {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::encode::ENCODERS;
+    use clap::CommandFactory as _;
+
+    /// Options of methods stand under headings of their own, and none has the name of another's.
+    #[test]
+    fn options_go_together() {
+        Cli::command().debug_assert();
+        let mut headings: Vec<String> = Vec::new();
+        for encoder in ENCODERS {
+            let command = encoder.arguments(clap::Command::new("own"));
+            let of = |argument: &clap::Arg| argument.get_help_heading().unwrap_or_default().to_owned();
+            let mut own: Vec<String> = command.get_arguments().map(of).collect();
+            own.dedup();
+            assert!(own.len() == 1 && !own[0].is_empty(), "{}: {own:?}", encoder.method());
+            headings.extend(own);
+        }
+        headings.sort();
+        headings.dedup();
+        assert_eq!(headings.len(), ENCODERS.len());
+    }
+
+    #[test]
+    fn options_of_a_method_are_refused_with_another() {
+        let code = |arguments: &[&str]| {
+            let fixed = ["selvedge", "encode", "no-such-dataset", "-o", "x"];
+            let cli = Cli::try_parse_from([&fixed, arguments].concat()).expect("parsed");
+            run(cli).expect_err("there is no such dataset").exit_code()
+        };
+        let refused: [&[&str]; 10] = [
+            &[],
+            &["--size", "1k", "--rank", "9"],
+            &["--size", "1k", "--shape", "1,2,3,4"],
+            &["--size", "1k", "--prefer", "bytes"],
+            &["--size", "1k", "--method", "auto", "--edge", "4"],
+            &["--size", "1k", "--method", "auto", "--layers", "2"],
+            &["--coefficients", "9", "--method", "auto"],
+            &["--size", "1k", "--method", "sparse-tensor", "--operations", "9"],
+            &["--size", "1k", "--method", "sparse-tensor", "--edge", "4"],
+            &["--rmse", "1", "--domain", "linear", "--method", "sparse-tensor"],
+        ];
+        assert!(refused.iter().all(|arguments| code(arguments) == 1), "refused before data are read");
+        let taken: [&[&str]; 4] = [
+            &["--size", "1k", "--method", "auto", "--rank", "9", "--operations", "9"],
+            &["--rmse", "1", "--domain", "linear", "--method", "auto"],
+            &["--shape", "1,2,3,4", "--method", "sparse-tensor"],
+            &["--coefficients", "9"],
+        ];
+        assert!(
+            taken.iter().all(|arguments| code(arguments) == 2),
+            "as far as the data, which are not there"
+        );
+    }
+}

@@ -95,3 +95,107 @@ pub fn encode(
     reached.sort_by(|a, b| preference.cost(a).total_cmp(&preference.cost(b)));
     Ok(reached)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::encode::encoder::Settings;
+    use crate::measure::baseline::tests::small;
+    use crate::measure::compare::Metrics;
+    use crate::progress::Quiet;
+
+    /// An encoder that gives what it is told to.
+    struct Fake {
+        method: &'static str,
+        gives: fn() -> Result<Vec<[u32; 2]>>,
+        caps: bool,
+    }
+
+    impl Encoder for Fake {
+        fn method(&self) -> &'static str {
+            self.method
+        }
+
+        fn about(&self) -> &'static str {
+            "a fake"
+        }
+
+        fn caps_operations(&self) -> bool {
+            self.caps
+        }
+
+        fn check(&self, _: Goal, common: &Common) -> Result<()> {
+            assert!(self.caps || common.operations.is_none(), "a cap reaches who keeps it alone");
+            Ok(())
+        }
+
+        fn check_choice(&self) -> Result<()> {
+            Ok(())
+        }
+
+        fn encode(&self, _: &Levels<'_>, _: Goal, common: &Common, _: &dyn Observer) -> Result<Attempts> {
+            let file = |[bytes, operations]: [u32; 2]| Encoded {
+                method: self.method,
+                transfer: common.transfer,
+                bytes: vec![0; bytes as usize],
+                operations,
+                predicted_rms: 0.0,
+                metrics: Metrics { log_rms: 1.0 / bytes as f64, ..Metrics::default() },
+                setting: String::new(),
+                settings: Settings::default(),
+            };
+            let mut attempts = Attempts::default();
+            match (self.gives)() {
+                Ok(files) => files.into_iter().try_for_each(|of| attempts.add(Ok(file(of))))?,
+                Err(error) => attempts.add(Err(error))?,
+            }
+            Ok(attempts)
+        }
+
+        fn choose(&self, _: Goal, reached: Vec<Encoded>) -> Option<Encoded> {
+            reached.into_iter().next()
+        }
+
+        fn arguments(&self, command: clap::Command) -> clap::Command {
+            command
+        }
+
+        fn configured(&self, _: &clap::ArgMatches) -> Result<Box<dyn Encoder>> {
+            Err(ToolError::Usage("no options".into()))
+        }
+    }
+
+    fn unreachable() -> ToolError {
+        ToolError::Unreachable { goal: "a goal".into(), least: "too little".into() }
+    }
+
+    #[test]
+    fn goals_out_of_reach_are_passed_over_and_mistakes_are_not() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let data = small(folder.path(), [3, 2]);
+        let run = |encoders: &[&dyn Encoder], operations, preference| {
+            let common = Common { operations, ..Common::default() };
+            encode(encoders, &Levels::of(&data), Goal::Bytes(9), &[common], preference, &Quiet)
+        };
+        let far = Fake { method: "far", gives: || Err(unreachable()), caps: false };
+        let two = Fake { method: "two", gives: || Ok(vec![[7, 30], [5, 50]]), caps: true };
+        let one = Fake { method: "one", gives: || Ok(vec![[6, 10]]), caps: false };
+        let wrong = Fake { method: "wrong", gives: || Err(ToolError::Usage("nonsense".into())), caps: false };
+        let sizes = |found: Result<Vec<Encoded>>| -> Vec<usize> {
+            found.expect("reached").iter().map(|encoded| encoded.bytes.len()).collect()
+        };
+        let all: [&dyn Encoder; 3] = [&far, &two, &one];
+        assert_eq!(sizes(run(&all, None, Preference::Bytes)), [5, 6, 7]);
+        assert_eq!(sizes(run(&all, None, Preference::Error(Domain::Log))), [7, 6, 5]);
+        assert_eq!(sizes(run(&all, None, Preference::Operations)), [6, 7, 5]);
+        assert_eq!(sizes(run(&all, Some(30), Preference::Bytes)), [6, 7]);
+        let capped = run(&all, Some(9), Preference::Bytes).expect_err("too many operations");
+        assert!(
+            matches!(capped, ToolError::Unreachable { .. }) && capped.to_string().contains("10"),
+            "{capped}"
+        );
+        assert!(matches!(run(&[&far], None, Preference::Bytes), Err(ToolError::Unreachable { .. })));
+        let mistaken = run(&[&two, &wrong], None, Preference::Bytes);
+        assert!(matches!(mistaken, Err(ToolError::Usage(_))), "a mistake is no goal out of reach");
+    }
+}
