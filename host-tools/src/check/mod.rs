@@ -5,5 +5,6 @@ pub mod count;
 pub mod example;
 pub mod explain;
 pub mod extreme;
+pub mod info;
 pub mod validate;
 pub mod vectors;

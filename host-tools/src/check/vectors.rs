@@ -4,17 +4,18 @@
 //! one states the rule that is broken, where, and what is found there (1.4-4). What is stated comes from the
 //! recipe alone, never from a decoder.
 
-use crate::check::example::{example_model, tensor_example_model};
-use crate::check::extreme::{extreme_model, extreme_tensor};
+use crate::check::extreme::extreme;
 use crate::error::{Result, ToolError};
 use crate::files;
-use crate::format::info::hex;
+use crate::format::bits::{hex, words_to_bytes};
+use crate::format::container::{
+    HEADER_WORDS, RawSection, SECTION_LIMIT, entry_at, header_word, is_dictionary, lay_out, repair_checksums,
+    repair_header_checksum, take_apart,
+};
 use crate::format::model::MaterialModel;
 use crate::format::triangulate::{triangulate, with_grid};
-use crate::format::write::{
-    Part, directions_part, lay_out, repair_checksums, repair_header_checksum, take_apart, words_to_bytes,
-    write_dictionary, write_material, write_split,
-};
+use crate::format::write::{directions_section, write_dictionary, write_material, write_split};
+use crate::methods::{by_name, by_number};
 use selvedge::Limits;
 use serde::Deserialize;
 use serde_json::Value;
@@ -40,7 +41,7 @@ struct Recipe {
     name: String,
     /// What it is for.
     note: String,
-    /// `example`, `extreme SEED`, or the name of another recipe whose model is taken.
+    /// `METHOD example`, `METHOD extreme SEED`, or the name of another recipe whose model is taken.
     #[serde(default = "example")]
     base: String,
     /// Which file of the model: `whole`, or `material` or `dictionary` where it is split in two.
@@ -63,8 +64,9 @@ struct Recipe {
     expect: Option<Expect>,
 }
 
+/// The base of most recipes.
 fn example() -> String {
-    "example".into()
+    "sparse-ensemble example".into()
 }
 
 #[derive(Clone, Copy, Debug, Default, Deserialize)]
@@ -220,9 +222,9 @@ fn place(file: &[u8], text: &str) -> Result<usize> {
     let (what, section) = base.split_once(' ').ok_or_else(bad)?;
     let (kind, instance) = section_key(section)?;
     let word = |at: usize| file.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-    let count = word(24).unwrap_or(0) as usize;
-    let entry = (0..count.min(4096))
-        .map(|i| 128 + i * 16)
+    let count = word(header_word::SECTION_COUNT * 4).unwrap_or(0) as usize;
+    let entry = (0..count.min(SECTION_LIMIT))
+        .map(entry_at)
         .find(|&e| word(e) == Some(kind | instance << 16))
         .ok_or_else(bad)?;
     match what {
@@ -273,7 +275,7 @@ impl Edit {
             }
             Edit::Add { add, words } => {
                 let ((kind, instance), bytes) = (section_key(add)?, words_of(words)?);
-                with_parts(file, |parts| parts.push(Part { kind, instance, bytes }));
+                with_parts(file, |parts| parts.push(RawSection { kind, instance, bytes }));
             }
             Edit::Words { section, words } => *section_of(file, section)? = words_of(words)?,
             Edit::Append { section, append } => section_of(file, section)?.extend(words_of(append)?),
@@ -297,7 +299,7 @@ impl Edit {
                     *grid,
                 );
                 *section_of(file, &format!("0003.{directions:04x}"))? =
-                    directions_part(*directions, points, &t).bytes;
+                    directions_section(*directions, points, &t).bytes;
             }
             Edit::Reference { reference } => {
                 let other = made.get(reference).ok_or_else(|| {
@@ -312,7 +314,7 @@ impl Edit {
 }
 
 /// Changes the sections of a file and lays it out again.
-fn with_parts(file: &mut Vec<u8>, change: impl FnOnce(&mut Vec<Part>)) {
+fn with_parts(file: &mut Vec<u8>, change: impl FnOnce(&mut Vec<RawSection>)) {
     let (header, mut parts) = take_apart(file);
     change(&mut parts);
     *file = lay_out(header, parts);
@@ -321,8 +323,8 @@ fn with_parts(file: &mut Vec<u8>, change: impl FnOnce(&mut Vec<Part>)) {
 /// The bytes of a section; the file is laid out again when they are let go.
 struct SectionBytes<'a> {
     file: &'a mut Vec<u8>,
-    header: [u32; 32],
-    parts: Vec<Part>,
+    header: [u32; HEADER_WORDS],
+    parts: Vec<RawSection>,
     at: usize,
 }
 
@@ -354,26 +356,30 @@ impl Drop for SectionBytes<'_> {
     }
 }
 
-/// The model of a base, changed.
+/// The model of a base.
+fn base_of(base: &str, models: &BTreeMap<String, MaterialModel>) -> Result<MaterialModel> {
+    let words: Vec<&str> = base.split(' ').collect();
+    match words.as_slice() {
+        [method, "example"] => Ok((by_name(method)?.example)()),
+        [method, "extreme", seed] => {
+            let seed = seed.parse().map_err(|_| ToolError::Usage(format!("`{seed}` is no seed")))?;
+            Ok(extreme(by_name(method)?, seed))
+        }
+        _ => {
+            let missing = || ToolError::Usage(format!("no recipe before this one is `{base}`"));
+            models.get(base).cloned().ok_or_else(missing)
+        }
+    }
+}
+
+/// The model of a recipe: its base, changed.
 fn model_of(recipe: &Recipe, models: &BTreeMap<String, MaterialModel>) -> Result<MaterialModel> {
     let wrong = |why: String| ToolError::Usage(format!("{}: {why}", recipe.name));
-    let base = match recipe.base.split_once(' ') {
-        _ if recipe.base == "example" => example_model(),
-        _ if recipe.base == "tensor example" => tensor_example_model(),
-        Some(("extreme-tensor", seed)) => {
-            extreme_tensor(seed.parse().map_err(|_| wrong(format!("`{seed}` is no seed")))?)
-        }
-        Some(("extreme", seed)) => {
-            extreme_model(seed.parse().map_err(|_| wrong(format!("`{seed}` is no seed")))?)
-        }
-        _ => models
-            .get(&recipe.base)
-            .cloned()
-            .ok_or_else(|| wrong(format!("no recipe before this one is `{}`", recipe.base)))?,
-    };
+    let base = base_of(&recipe.base, models).map_err(|error| wrong(error.to_string()))?;
     if recipe.change.is_empty() {
         return Ok(base);
     }
+    let method = by_number(base.method()).map_err(|finding| wrong(finding.to_string()))?;
     let mut value = serde_json::to_value(&base).map_err(|error| wrong(error.to_string()))?;
     for (pointer, new) in &recipe.change {
         let slot = value.pointer_mut(pointer).ok_or_else(|| wrong(format!("the model has no {pointer}")))?;
@@ -382,7 +388,10 @@ fn model_of(recipe: &Recipe, models: &BTreeMap<String, MaterialModel>) -> Result
         }
         *slot = new.clone();
     }
-    serde_json::from_value(value).map_err(|error| wrong(error.to_string()))
+    let mut model: MaterialModel<Value> =
+        serde_json::from_value(value).map_err(|error| wrong(error.to_string()))?;
+    let texture = (method.from_json)(model.texture.take()).map_err(|error| wrong(error.to_string()))?;
+    Ok(model.with_texture(texture))
 }
 
 /// Name of a part in a manifest.
@@ -392,7 +401,7 @@ fn part_name(part: selvedge::Part) -> &'static str {
 
 /// What this decoder says of a vector.
 pub fn answer(bytes: &[u8], dictionary: Option<&[u8]>, limits: &Limits) -> Answer {
-    if crate::format::info::is_dictionary(bytes) {
+    if is_dictionary(bytes) {
         let mut first = selvedge::First::default();
         selvedge::validate(bytes, dictionary, limits, &mut first);
         return match first.0 {

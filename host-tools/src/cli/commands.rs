@@ -9,14 +9,15 @@ use crate::error::{Result, ToolError};
 use crate::files;
 use crate::foreign::pixels::Colours;
 use crate::foreign::{self, ImportOptions, Kind, btf, images, ubo};
+use crate::format::blend::blend;
 use crate::format::model::MetadataModel;
-use crate::format::read;
 use crate::format::sector::Sector;
+use crate::format::texture::Blend;
 use crate::format::trim::{Keep, Trim, trim};
 use crate::format::write;
 use crate::measure::compare::Place;
 use crate::measure::compare::{self, Metrics, Source};
-use crate::methods::sparse_ensemble::blend::{Blend, blend};
+use crate::methods::read;
 use crate::methods::sparse_ensemble::dictionary_file::{self, Training};
 use crate::methods::sparse_ensemble::train;
 use crate::progress::Progress;
@@ -770,7 +771,7 @@ fn trim_file(args: TrimArgs) -> Result<u8> {
                 args.source.file.display()
             )));
         }
-        Ok(read::model_of(&file))
+        read::model_of(&file).map_err(super::invalid(&args.source))
     })?;
     let channels = args.channels.unwrap_or(Trim::default().channels);
     let options = Trim {
@@ -819,7 +820,7 @@ fn blend_files(args: BlendArgs) -> Result<u8> {
         let file = selvedge::open_with(&bytes, dictionary.as_deref(), &Limits::NONE);
         let file = file.map_err(|finding| ToolError::Invalid { path: path.to_owned(), finding })?;
         warn_of_triangles(path, &file);
-        Ok(read::model_of(&file))
+        read::model_of(&file).map_err(|finding| ToolError::Invalid { path: path.to_owned(), finding })
     };
     let options =
         Blend { exact: args.exact, most: args.most, scales_apart: args.scales_apart, ..Blend::default() };

@@ -8,12 +8,12 @@ mod measuring;
 
 use crate::check::conform;
 use crate::check::explain;
+use crate::check::info;
 use crate::check::validate;
 use crate::check::vectors;
 use crate::error::{Result, ToolError};
 use crate::files;
 use crate::foreign::{self, Kind};
-use crate::format::info;
 use crate::format::write;
 use crate::gpu::kernel;
 use crate::methods::sparse_ensemble::sparsebtf;
@@ -265,6 +265,12 @@ fn print_json(value: &impl serde::Serialize) -> Result<()> {
 }
 
 /// A material's bytes, opened for as long as `use_it` runs.
+/// A finding about a source's file.
+fn invalid(source: &Source) -> impl FnOnce(selvedge::Finding) -> ToolError {
+    let path = source.file.clone();
+    |finding| ToolError::Invalid { path, finding }
+}
+
 fn with_material<T>(source: &Source, use_it: impl FnOnce(selvedge::Selvedge<'_>) -> Result<T>) -> Result<T> {
     let bytes = files::read(&source.file)?;
     let dictionary = source.dictionary.as_deref().map(files::read).transpose()?;
@@ -322,7 +328,7 @@ fn tell_info(source: &Source, json: bool) -> Result<u8> {
     let is_stream = source.file == Path::new("-");
     match if is_stream { Kind::Material } else { foreign::detect(&source.file)? } {
         Kind::Material | Kind::Dictionary => with_material(source, |material| {
-            let info = info::info(&material);
+            let info = info::info(&material).map_err(invalid(source))?;
             if json {
                 print_json(&info)?
             } else {
@@ -459,7 +465,7 @@ fn run(cli: Cli) -> Result<u8> {
                     size[0], size[1]
                 )));
             }
-            let explanation = explain::explain(&material, texel, light, view);
+            let explanation = explain::explain(&material, texel, light, view).map_err(invalid(&source))?;
             if json {
                 print_json(&explanation)?
             } else {

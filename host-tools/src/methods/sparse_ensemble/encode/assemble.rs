@@ -4,25 +4,22 @@ use super::candidates::Candidates;
 use super::select::Selection;
 use super::{COEFFICIENT_BITS, Options, Prepared};
 use crate::data::dataset::Description;
-use crate::data::transfer::matrix_q13;
 use crate::error::{Result, ToolError};
-use crate::format::model::{
-    AtomModel, ChannelModel, CoefficientsModel, DictionaryModel, EnsembleModel, FactorModel, MaterialModel,
-    MetadataModel, PairTableModel, RecordModel, TransferModel,
-};
+use crate::format::model::MaterialModel;
+use crate::format::texture::Texture;
 use crate::format::triangulate::{project, triangulate};
 use crate::math::linear::Basis;
+use crate::methods::means::described;
 use crate::methods::sparse_ensemble::dictionary::Ensemble;
-use crate::methods::sparse_ensemble::quantise::{FloatRecord, Quantised, quantise, quantise_means};
-use glam::DVec3;
+use crate::methods::sparse_ensemble::model::{
+    AtomModel, CoefficientsModel, DictionaryModel, EnsembleModel, EnsembleTexture, FactorModel, RecordModel,
+};
+use crate::methods::sparse_ensemble::quantise::{FloatRecord, Quantised, quantise};
 use selvedge::cost::{Shape, filtered_operations};
 use selvedge::ensemble::dequantise;
 
 /// Most quality layers (3.1).
 const LAYER_LIMIT: usize = 8;
-
-/// Means of a channel as a file holds them.
-pub type MeanTable = PairTableModel;
 
 /// What the parts of a file are made with.
 pub struct Setting<'a> {
@@ -32,19 +29,6 @@ pub struct Setting<'a> {
     pub options: &'a Options,
     /// Magnitude of the least coefficient that is kept; 0 if that is not how they were chosen.
     pub threshold: f64,
-}
-
-/// Means over the smallest range of 16 bits that holds them, and as the decoder reads them.
-pub fn mean_tables(means: &[Vec<f64>; 3]) -> Result<([MeanTable; 3], [Vec<f32>; 3])> {
-    let mut tables: [MeanTable; 3] = Default::default();
-    let mut decoded: [Vec<f32>; 3] = Default::default();
-    for c in 0..3 {
-        tables[c] = quantise_means(&means[c].iter().map(|m| m * 1_048_576.0).collect::<Vec<_>>())?;
-        let (base, gain) = (tables[c].base_q20 as f64, 2f64.powi(tables[c].shift as i32));
-        decoded[c] =
-            tables[c].entries.iter().map(|&e| ((base + e as f64 * gain) / 1_048_576.0) as f32).collect();
-    }
-    Ok((tables, decoded))
 }
 
 /// Operations of a filtered sample beside those of its records (4.2-1).
@@ -121,10 +105,9 @@ pub fn material(
     selections: &[Selection; 3],
 ) -> Result<(MaterialModel, f64)> {
     let description = setting.prepared.levels[0].description();
-    let mut channels: [ChannelModel; 3] = Default::default();
+    let mut texture = EnsembleTexture::default();
     let mut rounding = 0.0;
     for c in 0..3 {
-        channels[c].mean = Some(setting.prepared.means[c].clone());
         if selections[c].count > 0 {
             let of_channel: Vec<&Candidates> = candidates.iter().map(|level| &level[c]).collect();
             let (ensemble, lost) = channel(
@@ -134,15 +117,14 @@ pub fn material(
                 &selections[c],
                 setting.options.value_bits.map(|bits| bits[c]),
             )?;
-            channels[c].ensemble = Some(ensemble);
+            texture.channels[c] = Some(ensemble);
             rounding += lost;
         }
     }
     // Records that overflow may have given one channel more layers than another.
-    let layers = channels
-        .iter()
-        .flat_map(|c| c.ensemble.as_ref())
-        .map(|e| e.coefficients[0].len())
+    let layers = texture
+        .full()
+        .map(|(_, ensemble)| ensemble.coefficients[0].len())
         .max()
         .unwrap_or(setting.options.layers);
     if layers > LAYER_LIMIT {
@@ -151,7 +133,7 @@ pub fn material(
             "blocks of this edge need {layers} layers for this many coefficients, and {LAYER_LIMIT} are possible: {hint}"
         )));
     }
-    for ensemble in channels.iter_mut().flat_map(|c| c.ensemble.as_mut()) {
+    for ensemble in texture.channels.iter_mut().flatten() {
         for coefficients in &mut ensemble.coefficients {
             let empty = CoefficientsModel {
                 value_bits: 1,
@@ -160,40 +142,15 @@ pub fn material(
             coefficients.resize(layers, empty);
         }
     }
-    let model = MaterialModel {
-        level_count: setting.prepared.levels.len() as u32,
-        edge: setting.options.edge as u32,
-        layer_count: layers as u32,
-        channels,
-        ..described(description, setting.prepared.forward.transfer)
-    };
-    Ok((model, rounding))
-}
-
-/// What a dataset says of its material, which has no channel yet: one level, one layer, blocks of one texel.
-pub fn described(description: &Description, transfer: TransferModel) -> MaterialModel {
-    let points = |directions: &[DVec3]| directions.iter().map(|&d| project(d)).collect();
-    MaterialModel {
-        size: description.size.map(|n| n as u32),
-        level_count: 1,
-        edge: 1,
-        layer_count: 1,
-        transfer,
-        cosine_included: description.cosine_included,
-        matrix_q13: matrix_q13(),
-        metadata: MetadataModel {
-            texel_nm: description.texel_nm,
-            frame: 0,
-            image_origin: 0,
-            primaries: 0,
-            texts: description.texts.clone(),
-        },
-        lights: points(&description.lights),
-        views: (description.lights != description.views).then(|| points(&description.views)),
-        channels: Default::default(),
-        tensor: None,
-        extras: Vec::new(),
+    let texture: Box<dyn Texture> = Box::new(texture);
+    let mut model = described(description, setting.prepared.forward.transfer).with_texture(texture);
+    model.level_count = setting.prepared.levels.len() as u32;
+    model.edge = setting.options.edge as u32;
+    model.layer_count = layers as u32;
+    for (channel, mean) in model.channels.iter_mut().zip(&setting.prepared.means) {
+        channel.mean = Some(mean.clone());
     }
+    Ok((model, rounding))
 }
 
 fn channel(

@@ -13,16 +13,18 @@ pub mod select;
 use crate::data::dataset::Dataset;
 use crate::data::transfer::Forward;
 use crate::error::{Result, ToolError};
-use crate::format::model::{MaterialModel, TransferModel};
+use crate::format::model::{MaterialModel, PairTableModel, TransferModel};
 use crate::format::write::{write_material, write_with_dictionary};
 use crate::math::linear::{Basis, eigenbasis};
+use crate::methods::means::mean_tables;
 use crate::methods::sparse_ensemble::blocks::{Blocks, Moments, moments};
 use crate::methods::sparse_ensemble::dictionary::{Ensemble, Turn};
-use assemble::{MeanTable, Setting, mean_tables};
+use assemble::Setting;
 use candidates::{Candidates, Keep, collect};
 use rayon::prelude::*;
 use select::{Channel, Selection};
 use selvedge::cost::record_operations;
+use selvedge::directory::SPATIAL;
 use std::f64::consts::LN_2;
 use std::sync::Arc;
 
@@ -94,7 +96,7 @@ pub struct Prepared<'a> {
     /// Radiance to channels.
     pub forward: Forward,
     /// Means as the file holds them.
-    pub means: [MeanTable; 3],
+    pub means: [PairTableModel; 3],
     /// Means that the decoder will add, in floats.
     pub decoded_means: [Vec<f32>; 3],
     /// Second moments.
@@ -435,7 +437,7 @@ fn finish(
             let same_edge = ensembles.iter().all(|e| {
                 e.tables.as_ref().is_some_and(|t| t[0].x.entries.len() == options.edge * options.edge)
             });
-            write_with_dictionary(&model, dictionary, !same_edge)
+            write_with_dictionary(&model, dictionary, if same_edge { &[] } else { &[SPATIAL] })
         }
         None => write_material(&model),
     };

@@ -11,12 +11,14 @@ pub mod integers;
 use crate::data::dataset::Dataset;
 use crate::data::transfer::Forward;
 use crate::error::{Result, ToolError};
-use crate::format::model::{ChannelModel, ListsModel, MaterialModel, TensorModel, TransferModel};
+use crate::format::model::{MaterialModel, TransferModel};
+use crate::format::texture::Texture;
 use crate::format::write::write_material;
 use crate::math::ksvd::{Pursuit, Rows, dot, gram, pursue};
 use crate::math::linear::{ordered, product_bt};
 use crate::measure::baseline::pca::{Domain, Pca};
-use crate::methods::sparse_ensemble::encode::assemble::{described, mean_tables};
+use crate::methods::means::{described, mean_tables};
+use crate::methods::sparse_tensor::model::{ListsModel, TensorModel};
 use fit::{Fit, Shape, Trained, Training, fit};
 use integers::{Atoms, Quantiser};
 use rayon::prelude::*;
@@ -356,7 +358,7 @@ pub fn encode_fit(pca: &Pca<'_>, fitted: &Fit, coarser: &[&Dataset], options: &O
             let per_level: Vec<Vec<Vec<(u32, u16)>>> =
                 lists.iter_mut().map(|lists| std::mem::take(&mut lists.model)).collect();
             let (shifts, shift) = quantiser.shifts(&per_level);
-            let tensor = TensorModel {
+            let tensor: Box<dyn Texture> = Box::new(TensorModel {
                 channels: [true; 3],
                 light_atoms: atoms.light_atoms(),
                 lights: atoms.lights(),
@@ -367,16 +369,10 @@ pub fn encode_fit(pca: &Pca<'_>, fitted: &Fit, coarser: &[&Dataset], options: &O
                     .into_iter()
                     .map(|lists| vec![ListsModel { value_bits, shift, lists }])
                     .collect(),
-            };
-            let model = MaterialModel {
-                level_count: levels.len() as u32,
-                channels: std::array::from_fn(|c| ChannelModel {
-                    mean: Some(tables[c].clone()),
-                    ..ChannelModel::default()
-                }),
-                tensor: Some(tensor),
-                ..described(description, transfer)
-            };
+            });
+            let mut model = described(description, transfer).with_texture(tensor);
+            model.level_count = levels.len() as u32;
+            model.channels.iter_mut().zip(&tables).for_each(|(c, table)| c.mean = Some(table.clone()));
             let bytes = write_material(&model);
             (model, bytes, lists.swap_remove(0))
         };
