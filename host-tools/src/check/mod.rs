@@ -2,6 +2,7 @@
 
 pub mod conform;
 pub mod count;
+mod edits;
 pub mod example;
 pub mod explain;
 pub mod extreme;

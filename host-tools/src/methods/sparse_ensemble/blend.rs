@@ -108,39 +108,21 @@ fn blend_ensembles(
         })
         .collect();
     let bases: Vec<Basis> = dictionaries.par_iter().map(|dictionary| Basis::new(dictionary)).collect();
-    let pairs: Vec<Vec<Vec<Pair>>> = (0..a.coefficients.len())
-        .map(|level| {
-            let blocks = a.coefficients[level]
-                .iter()
-                .chain(&b.coefficients[level])
-                .map(|layer| layer.records.len())
-                .max()
-                .unwrap_or(0);
-            let layers = a.coefficients[level].len().max(b.coefficients[level].len());
-            let of_layer = |layer: usize| {
-                let of_a = float_layer(a, level, layer, 1.0 - alpha, blocks);
-                let of_b = float_layer(b, level, layer, alpha, blocks);
-                of_a.into_par_iter()
-                    .zip(of_b)
-                    .map(|(of_a, of_b)| pair_of(&bases, of_a, (number_of_b[of_b.0], of_b.1)))
-                    .collect()
-            };
-            (0..layers).map(of_layer).collect()
-        })
-        .collect();
-    let mut changes: Vec<(usize, usize)> = pairs
-        .iter()
-        .flatten()
-        .flatten()
-        .filter(|pair| needs_change(pair))
-        .map(|pair| (pair.target.0, pair.other.0))
-        .collect();
-    changes.sort_unstable();
-    changes.dedup();
-    let changes: BTreeMap<(usize, usize), Change> = changes
-        .into_par_iter()
-        .map(|(target, other)| ((target, other), Change::new(&bases[target], &bases[other])))
-        .collect();
+    let pairs_of_level = |level: usize| -> Vec<Vec<Pair>> {
+        let (of_a, of_b) = (&a.coefficients[level], &b.coefficients[level]);
+        let blocks = of_a.iter().chain(of_b).map(|layer| layer.records.len()).max().unwrap_or(0);
+        let of_layer = |layer: usize| {
+            let of_a = float_layer(a, level, layer, 1.0 - alpha, blocks);
+            let of_b = float_layer(b, level, layer, alpha, blocks);
+            of_a.into_par_iter()
+                .zip(of_b)
+                .map(|(of_a, of_b)| pair_of(&bases, of_a, (number_of_b[of_b.0], of_b.1)))
+                .collect()
+        };
+        (0..of_a.len().max(of_b.len())).map(of_layer).collect()
+    };
+    let pairs: Vec<Vec<Vec<Pair>>> = (0..a.coefficients.len()).map(pairs_of_level).collect();
+    let changes = changes_of(&bases, pairs.iter().flatten().flatten());
     let mut records = Vec::with_capacity(pairs.len());
     for level in pairs {
         let mut of_level = Vec::with_capacity(level.len());
@@ -171,6 +153,19 @@ fn blend_ensembles(
     let (atoms, coefficients) = quantise(&records, dictionaries.len(), &bits)?;
     let dictionaries = dictionaries.into_iter().cloned().collect();
     within_limit(EnsembleModel { dictionaries, atoms, coefficients })
+}
+
+/// The changes of basis that pairs take.
+fn changes_of<'a>(
+    bases: &[Basis],
+    pairs: impl Iterator<Item = &'a Pair>,
+) -> BTreeMap<(usize, usize), Change> {
+    let mut changes: Vec<(usize, usize)> =
+        pairs.filter(|pair| needs_change(pair)).map(|pair| (pair.target.0, pair.other.0)).collect();
+    changes.sort_unstable();
+    changes.dedup();
+    let change = |(target, other): (usize, usize)| Change::new(&bases[target], &bases[other]);
+    changes.into_par_iter().map(|key| (key, change(key))).collect()
 }
 
 /// Drops what nothing uses and refuses more dictionaries than a file has room for.

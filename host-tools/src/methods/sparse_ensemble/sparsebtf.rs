@@ -95,6 +95,9 @@ impl Foreign {
 }
 
 /// Names of the materials whose coefficients are in a folder.
+///
+/// # Errors
+/// If the folder cannot be read.
 pub fn materials_in(folder: &Path) -> Result<Vec<String>> {
     let mut names: Vec<String> = std::fs::read_dir(folder)
         .map_err(ToolError::io(folder))?
@@ -113,6 +116,9 @@ pub fn materials_in(folder: &Path) -> Result<Vec<String>> {
 }
 
 /// Reads a material's files; `blocks` along x and y, or a square if `None`.
+///
+/// # Errors
+/// If a file cannot be read, or is not what its layout says ([`ToolError::Foreign`], with the byte).
 pub fn read_material(folder: &Path, name: &str, blocks: Option<[usize; 2]>) -> Result<AuthorsMaterial> {
     let locations = Foreign::read(folder.join("xyz_loc.bin"))?;
     let xyz = locations.doubles();
@@ -351,6 +357,9 @@ impl AuthorsMaterial {
     }
 
     /// The model of a file, values quantised to `value_bits`.
+    ///
+    /// # Errors
+    /// [`ToolError::Usage`] if values are beyond the format.
     pub fn to_model(&self, value_bits: u32) -> Result<MaterialModel> {
         let missing = self.channels.iter().filter(|c| c.is_none()).count();
         let mut channels: [ChannelModel; 3] = Default::default();
