@@ -12,6 +12,8 @@ const OTHER_FEATURES: &[(&str, &str)] = &[
     ("default", "what is there without asking"),
     ("all-methods", "every method"),
     ("batch", "the fast paths"),
+    ("planted", "a panic in the firmware, to show that its proof can fail"),
+    ("proof", "the firmware without a panic handler that ends the program"),
 ];
 
 fn root() -> PathBuf {

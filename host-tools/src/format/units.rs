@@ -2,6 +2,8 @@
 
 /// One in Q13: entries of the colour matrix.
 pub const ONE_Q13: f64 = 8_192.0;
+/// One in Q14: the radius of the disc of directions.
+pub const ONE_Q14: f64 = 16_384.0;
 /// One in Q15: factors, weights, cosines, scales.
 pub const ONE_Q15: f64 = 32_768.0;
 /// One in Q20: values of channels, means.

@@ -1,4 +1,4 @@
-//! `validate`: every finding of a file, as the core's own checker tells it, and what is legal but unwise.
+//! `validate`: every finding of a file, as the core's own checker reports it, and what is legal but wasteful.
 //!
 //! There is no second parser: [`selvedge::open_telling`] is `open` with a sink that goes on. What this module
 //! adds is words: severity, hints, counts, and reports as text, JSON ([`Reports`] is the published schema)

@@ -292,7 +292,7 @@ fn weigh(ensemble: &EnsembleModel, weight: f64) -> Result<EnsembleModel> {
             return Ok(weighted);
         }
     }
-    // Rounding takes a record that is full to the brim over it: values are quantised anew.
+    // Rounding takes a record that is full to the brim over it: values are quantised again.
     let of_layer = |layer: &CoefficientsModel| {
         layer.records.iter().map(|record| float_record(ensemble, record, layer.value_bits, weight)).collect()
     };

@@ -53,7 +53,7 @@ fn extreme_ensemble(r: &mut Random, extent: &Extent) -> EnsembleModel {
 
 fn extreme_factor(r: &mut Random, rows: usize, most_columns: i64) -> FactorModel {
     let columns = r.range(1, most_columns) as u32;
-    let constant = r.once_in(4).then(|| r.pick(&[32_767i16, -32_767]));
+    let constant = r.once_in(4).then(|| r.pick(&[i16::MAX, -i16::MAX]));
     FactorModel {
         columns,
         entries: (0..rows * columns as usize).map(|_| constant.unwrap_or_else(|| r.entry())).collect(),
@@ -66,7 +66,7 @@ fn extreme_atoms(r: &mut Random, d: &DictionaryModel, reach: Reach) -> Vec<AtomM
         let mut column = |factor: &FactorModel| r.range(0, factor.columns as i64 - 1) as u32;
         let (light, view, x, y) = (column(&d.light), column(&d.view), column(&d.x), column(&d.y));
         let base = r.entry();
-        let room = 32_767 - base as i64;
+        let room = i16::MAX as i64 - base as i64;
         let step = r.pick(&[0, room, r.clone().range(0, room)]) as u16;
         let atom = AtomModel {
             light,

@@ -19,9 +19,9 @@ pub const DICTIONARY_BITS_BIT: u32 = 8;
 pub const COUNT_BITS_BIT: u32 = 16;
 /// Words in front of the tables of a section of factors or atoms (10.1-1, 10.5-3).
 pub const COUNT_WORDS: u32 = 2;
-/// Words of a dictionary in the head of a section of factors (10.1-2).
+/// Words of a dictionary in the header of a section of factors (10.1-2).
 pub const FACTOR_ENTRY_WORDS: u32 = 4;
-/// Words of a dictionary in the head of the table of atoms (10.5-4).
+/// Words of a dictionary in the header of the table of atoms (10.5-4).
 pub const LIST_ENTRY_WORDS: u32 = 2;
 /// Words of an atom.
 pub const ATOM_WORDS: u32 = 2;
@@ -50,7 +50,7 @@ pub fn value_bits(head: u32) -> u32 {
     head & EIGHT_BITS
 }
 
-/// First word of the head of a dictionary in the factors of a channel.
+/// First word of the header of a dictionary in the factors of a channel.
 pub fn factor_entry(section: u32, dictionary: u32) -> u32 {
     section + COUNT_WORDS + dictionary * FACTOR_ENTRY_WORDS
 }

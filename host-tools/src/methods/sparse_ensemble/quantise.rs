@@ -8,6 +8,7 @@
 
 use crate::error::{Result, ToolError};
 use crate::format::units::LARGEST_ENTRY;
+use crate::methods::sparse_ensemble::layout::{VIEW_BIT, atom_columns};
 use crate::methods::sparse_ensemble::model::{AtomModel, CoefficientsModel, RecordModel};
 use selvedge::ensemble::dequantise;
 use selvedge::ensemble_set::{ATOM_LIMIT, SUM_LIMIT};
@@ -123,7 +124,7 @@ fn atom_keys(records: &[Vec<Vec<FloatRecord>>], dictionaries: usize) -> Result<V
     let mut keys: Vec<Vec<u32>> = vec![Vec::new(); dictionaries];
     for (number, list) in records.iter().flatten().flatten() {
         match keys.get_mut(*number) {
-            Some(keys) => keys.extend(list.iter().map(|(atom, _)| atom.word() >> 4)),
+            Some(keys) => keys.extend(list.iter().map(|(atom, _)| atom.word() >> VIEW_BIT)),
             None if list.is_empty() => {}
             None => {
                 return Err(ToolError::Usage(format!(
@@ -158,7 +159,7 @@ impl<'a> Group<'a> {
             let first = atoms.len();
             let mut sum = 0.0;
             for (atom, value) in list {
-                let place = keys[*number].partition_point(|&key| key < atom.word() >> 4);
+                let place = keys[*number].partition_point(|&key| key < atom.word() >> VIEW_BIT);
                 atoms.push((starts[*number] + place) as u32);
                 largest = largest.max(value.abs());
                 sum += value.abs();
@@ -203,13 +204,8 @@ impl<'a> Group<'a> {
 
 /// The atom whose word without shift is `key`.
 fn atom_of(key: u32) -> AtomModel {
-    AtomModel {
-        y: key >> 24,
-        x: key >> 20 & 0xf,
-        light: key >> 10 & 0x3ff,
-        view: key & 0x3ff,
-        ..AtomModel::default()
-    }
+    let [light, view, x, y] = atom_columns(key << VIEW_BIT);
+    AtomModel { light, view, x, y, ..AtomModel::default() }
 }
 
 /// Atoms whose ranges hold all values at these shifts, or the group whose shift is too fine.

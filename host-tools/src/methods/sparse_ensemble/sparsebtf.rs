@@ -1,4 +1,4 @@
-//! Import of the files of SparseBTF (Kavoosighafi et al. 2023), without encoding anew.
+//! Import of the files of SparseBTF (Kavoosighafi et al. 2023), without encoding again.
 //!
 //! The authors' coefficients and dictionaries become a legal file: each column is scaled to its largest
 //! entry and the scale folded into the coefficients, columns and dictionaries that no block uses are left

@@ -60,7 +60,7 @@ impl Default for Options {
     }
 }
 
-/// What training tells while it runs.
+/// What training reports while it runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Step {
     /// Channel, 0 to 2.
@@ -69,7 +69,7 @@ pub struct Step {
     pub iteration: usize,
     /// Error energy over that of the blocks.
     pub objective: f64,
-    /// Dictionaries without a block that began anew.
+    /// Dictionaries without a block that were started again.
     pub revived: usize,
 }
 
@@ -560,7 +560,7 @@ impl Set {
         }
     }
 
-    /// Dictionaries without a block begin anew, from the blocks with the largest errors.
+    /// Dictionaries without a block start again, from the blocks with the largest errors.
     fn revive(&self, ensemble: &mut Ensemble, members: &[usize], errors: &[f64]) -> usize {
         let mut order: Vec<usize> = (0..errors.len()).collect();
         order.sort_by(|&a, &b| errors[b].total_cmp(&errors[a]).then(a.cmp(&b)));

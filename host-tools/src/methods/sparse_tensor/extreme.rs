@@ -11,6 +11,10 @@ use selvedge::tensor::list_coefficient;
 use selvedge::tensor_set::{FIBRE_SUM_LIMIT, LIST_SUM_LIMIT};
 use std::collections::BTreeSet;
 
+/// Ends of a fibre's entry.
+const LEAST: i64 = i16::MIN as i64;
+const LARGEST: i64 = i16::MAX as i64;
+
 /// A legal material by random numbers.
 ///
 /// The shared parts are those of a sparse ensemble of the same numbers, whose textures go: the numbers in
@@ -57,8 +61,8 @@ fn extreme_atoms(
     for _ in 0..views as i64 * atoms {
         let mut left = FIBRE_SUM_LIMIT;
         for _ in 0..entries {
-            let any = r.range(-32_768, 32_767);
-            let wanted = if full { r.pick(&[-32_768, 32_767]) } else { r.pick(&[any, any >> 4, 0, -32_768]) };
+            let any = r.range(LEAST, LARGEST);
+            let wanted = if full { r.pick(&[LEAST, LARGEST]) } else { r.pick(&[any, any >> 4, 0, LEAST]) };
             let mut value = wanted as i16 as u16 as u32 & !mask;
             if (value as u16 as i16).unsigned_abs() as u32 > left {
                 value = 0;
