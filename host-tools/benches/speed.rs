@@ -10,6 +10,7 @@ use selvedge_tools::format::model::{MaterialModel, TransferModel};
 use selvedge_tools::format::write;
 use selvedge_tools::math::random::Random;
 use selvedge_tools::methods::sparse_ensemble::encode::{Criterion, Options, encode, prepare};
+use selvedge_tools::methods::sparse_ensemble::model::{ensembles, ensembles_mut};
 use selvedge_tools::methods::sparse_ensemble::sparsebtf;
 use selvedge_tools::synth::{Mesostructure, Request, synthesise};
 use std::hint::black_box;
@@ -68,7 +69,7 @@ fn queries(seed: u64) -> Vec<FilteredQuery> {
 fn mean_operations(model: &MaterialModel) -> [f64; 2] {
     let edge = model.edge as f64;
     let (mut sample, mut image, mut channels, mut blocks) = (0.0, 0.0, 0.0, 1.0);
-    for ensemble in model.channels.iter().filter_map(|channel| channel.ensemble.as_ref()) {
+    for ensemble in ensembles(model) {
         let records = &ensemble.coefficients[0][0].records;
         channels += 1.0;
         blocks = records.len() as f64;
@@ -246,7 +247,7 @@ fn main() {
     let mut model = authors.to_model(10).expect("model");
     let repeat = (5_000_000 / 400_000).min(16_000 / model.size[1]);
     model.size[1] *= repeat;
-    for ensemble in model.channels.iter_mut().filter_map(|channel| channel.ensemble.as_mut()) {
+    for ensemble in ensembles_mut(&mut model) {
         let records = &mut ensemble.coefficients[0][0].records;
         let once = records.clone();
         (1..repeat).for_each(|_| records.extend(once.iter().cloned()));

@@ -16,6 +16,7 @@ use selvedge_tools::math::random::Random;
 use selvedge_tools::measure::baseline::pca::{Domain, pca};
 use selvedge_tools::methods::sparse_tensor::encode::fit::{Shape, Training};
 use selvedge_tools::methods::sparse_tensor::encode::{Options, encode};
+use selvedge_tools::methods::sparse_tensor::model::tensor_of;
 use selvedge_tools::synth::{Mesostructure, Request, synthesise};
 use std::hint::black_box;
 use std::time::Instant;
@@ -47,7 +48,7 @@ struct Floats {
 
 impl Floats {
     fn new(model: &MaterialModel) -> Floats {
-        let tensor = model.tensor.as_ref().expect("a sparse tensor");
+        let tensor = tensor_of(model).expect("a sparse tensor");
         let layer = &tensor.lists[0][0];
         let most = layer.lists.iter().map(Vec::len).max().unwrap_or(0);
         let mask = (1u16 << (32 - (tensor.light_atoms - 1).leading_zeros())) - 1;
@@ -184,7 +185,7 @@ fn measure(data: &Dataset, light_atoms: usize, abrdf_atoms: usize) {
         let mut atoms = std::collections::BTreeSet::new();
         for axis_y in [axis(query.v_q32).first.block, axis(query.v_q32).second.block] {
             for axis_x in [axis(query.u_q32).first.block, axis(query.u_q32).second.block] {
-                let tensor = encoded.model.tensor.as_ref().expect("a tensor");
+                let tensor = tensor_of(&encoded.model).expect("a tensor");
                 atoms.extend(
                     tensor.lists[0][0].lists[(axis_y * m.width + axis_x) as usize].iter().map(|c| c.0),
                 );

@@ -14,6 +14,7 @@ use selvedge_tools::measure::baseline::pca::{self, Choice};
 use selvedge_tools::measure::baseline::published::Published;
 use selvedge_tools::measure::compare::{Metrics, Source, compare};
 use selvedge_tools::methods::sparse_ensemble::encode::{Criterion, Encoded, Options, encode, prepare};
+use selvedge_tools::methods::sparse_ensemble::model::ensembles;
 use std::path::Path;
 
 /// Edges of blocks that are tried.
@@ -51,7 +52,7 @@ const KINDS: [u32; 8] = [
 fn coefficient_bits(encoded: &Encoded) -> [u64; 4] {
     let bits_for = |n: u32| 32 - n.leading_zeros();
     let mut bits = [0u64; 4];
-    for ensemble in encoded.model.channels.iter().flat_map(|channel| channel.ensemble.as_ref()) {
+    for ensemble in ensembles(&encoded.model) {
         for coefficients in ensemble.coefficients.iter().flatten() {
             let largest =
                 coefficients.records.iter().map(|record| record.coefficients.len() as u32).max().unwrap_or(0);

@@ -86,7 +86,8 @@ fn main() -> Result<()> {
             "  {} bytes, error {error:.5} (predicted {:.5}), {mean:.2} coefficients a texel of {} bits, {} clipped, {} operations, {:.1} s; components {rival}",
             encoded.bytes.len(),
             encoded.predicted_rms,
-            encoded.model.tensor.as_ref().map_or(0, |t| t.lists[0][0].value_bits),
+            selvedge_tools::methods::sparse_tensor::model::tensor_of(&encoded.model)
+                .map_or(0, |t| t.lists[0][0].value_bits),
             encoded.clipped,
             file.header().operations,
             start.elapsed().as_secs_f64()

@@ -6,7 +6,6 @@
 use selvedge::batch::FilteredQuery;
 use selvedge::{Direction, Finding, First, Limits, Part, Rgb, Selvedge};
 use selvedge_tools::check::count;
-use selvedge_tools::check::extreme::{Reach, extreme_model_from, extreme_tensor_from};
 use selvedge_tools::check::vectors::{Answer, Vector};
 use selvedge_tools::data::dataset::Dataset;
 use selvedge_tools::error::ToolError;
@@ -16,9 +15,12 @@ use selvedge_tools::foreign::btf::Btf;
 use selvedge_tools::foreign::bytes::Bytes;
 use selvedge_tools::foreign::images::{self, ImageSet};
 use selvedge_tools::foreign::pixels::{self, Colours};
-use selvedge_tools::format::read::{model_of, same_triangles};
-use selvedge_tools::format::write::{lay_out, repair_checksums, take_apart, write_material, write_split};
+use selvedge_tools::format::container::{lay_out, repair_checksums, take_apart};
+use selvedge_tools::format::write::{write_material, write_split};
 use selvedge_tools::math::random::Random;
+use selvedge_tools::methods::METHODS;
+use selvedge_tools::methods::reach::Reach;
+use selvedge_tools::methods::read::{model_of, same_triangles};
 use selvedge_tools::methods::sparse_ensemble::dictionary_file;
 use selvedge_tools::methods::sparse_ensemble::sparsebtf;
 use std::path::{Path, PathBuf};
@@ -108,7 +110,7 @@ pub fn open_and_sample(file: &[u8], dictionary: Option<&[u8]>) -> bool {
         Err(finding) => {
             check_finding(finding, file, dictionary);
             // A dictionary is legal by itself and no material.
-            let is_dictionary = selvedge_tools::format::info::is_dictionary(file);
+            let is_dictionary = selvedge_tools::format::container::is_dictionary(file);
             assert!(is_dictionary || first.0 == Some(finding), "{finding}");
             false
         }
@@ -139,6 +141,7 @@ fn sample_all_paths(material: &Selvedge<'_>, seed: u64) {
         assert_eq!(material.filtered(query.u_q32, query.v_q32, query.light, query.view), *rgb, "{query:?}");
         let level = random.word() % header.level_count;
         let counted = count::filtered(material, level, query.u_q32, query.v_q32, query.light, query.view);
+        let counted = counted.expect("a method of these tools");
         assert!(
             counted.operations <= header.operations as u64,
             "{} operations where {} are stated",
@@ -316,14 +319,13 @@ pub fn generate(data: &[u8]) {
     // ones.
     let reach = if data.len() % 64 == 0 { Reach::FULL } else { Reach::SMALL };
     // The last byte says which method; without one it is the first.
-    let grow =
-        if data.last().is_some_and(|byte| byte & 1 == 1) { extreme_tensor_from } else { extreme_model_from };
-    let model = grow(&mut Random::from_bytes(data), reach);
+    let method = METHODS[data.last().map_or(0, |&byte| byte as usize) % METHODS.len()];
+    let model = (method.extreme)(&mut Random::from_bytes(data), reach);
     let file = write_material(&model);
     let material = selvedge::open(&file, &Limits::NONE).unwrap_or_else(|finding| panic!("{finding}"));
     sample_all_paths(&material, data.len() as u64);
     assert!(same_triangles(&material));
-    let back = model_of(&material);
+    let back = model_of(&material).expect("a method of these tools");
     assert!(back == model, "the model changed on its way through a file");
     assert!(write_material(&back) == file, "decoding and encoding is not the identity");
     if model.has_texture() {

@@ -6,10 +6,12 @@
 
 use selvedge::{Direction, Limits, Rule, Selvedge};
 use selvedge_tools::check::count;
-use selvedge_tools::check::example::example_model;
+use selvedge_tools::format::container::{repair_checksums, take_apart};
 use selvedge_tools::format::model::{ChannelModel, MaterialModel, PairTableModel};
-use selvedge_tools::format::write::{repair_checksums, take_apart, write_material, write_split};
+use selvedge_tools::format::write::{write_material, write_split};
 use selvedge_tools::math::random::Random;
+use selvedge_tools::methods::sparse_ensemble::example::example_model;
+use selvedge_tools::methods::sparse_ensemble::model::EnsembleTexture;
 
 fn set_word(file: &mut [u8], at: usize, value: u32) {
     file[at..at + 4].copy_from_slice(&value.to_le_bytes());
@@ -31,8 +33,11 @@ fn dearest(material: &Selvedge<'_>) -> u64 {
         };
         let (light, view) = (direction(), direction());
         let level = random.word() % material.header().level_count;
-        most =
-            most.max(count::filtered(material, level, random.word(), random.word(), light, view).operations);
+        most = most.max(
+            count::filtered(material, level, random.word(), random.word(), light, view)
+                .expect("known")
+                .operations,
+        );
     }
     assert!(most <= material.header().operations as u64);
     most
@@ -43,6 +48,7 @@ fn plain(lights: Vec<[i32; 2]>) -> MaterialModel {
     let mut model = example_model();
     let table = PairTableModel { base_q20: 0, shift: 0, entries: vec![1; lights.len() * lights.len()] };
     model.lights = lights;
+    model.texture = Box::new(EnsembleTexture::default());
     model.channels = [
         ChannelModel { mean: Some(table), ..ChannelModel::default() },
         ChannelModel::default(),

@@ -4,15 +4,19 @@ use proptest::prelude::*;
 use selvedge::interpolation::{VALUE_BOUND, filtered_values};
 use selvedge::{Direction, Limits, Selvedge, Values};
 use selvedge_tests::setting;
-use selvedge_tools::check::extreme::extreme_model;
-use selvedge_tools::format::model::{
-    AtomModel, DictionaryModel, EnsembleModel, FactorModel, MaterialModel, TransferModel,
-};
-use selvedge_tools::format::read::read_model;
+use selvedge_tools::check::extreme::extreme;
+use selvedge_tools::format::blend::blend;
+use selvedge_tools::format::model::{MaterialModel, TransferModel};
+use selvedge_tools::format::texture::{Blend, BlendReport};
 use selvedge_tools::format::trim::{Keep, Trim, trim};
 use selvedge_tools::format::write::write_material;
 use selvedge_tools::math::random::Random;
-use selvedge_tools::methods::sparse_ensemble::blend::{Blend, Report, blend};
+use selvedge_tools::methods::read::read_model;
+use selvedge_tools::methods::sparse_ensemble;
+use selvedge_tools::methods::sparse_ensemble::model::{
+    AtomModel, CoefficientsModel, DictionaryModel, EnsembleModel, FactorModel, RecordModel, ensemble_of,
+    ensembles, ensembles_mut,
+};
 use selvedge_tools::methods::sparse_ensemble::quantise::{FloatRecord, quantise};
 use std::path::Path;
 
@@ -20,6 +24,10 @@ fn excerpt() -> MaterialModel {
     let file = std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("data/carpet07-excerpt.selv"))
         .expect("excerpt");
     read_model(&file, None, &Limits::NONE).expect("legal")
+}
+
+fn extreme_ensemble(seed: u64) -> MaterialModel {
+    extreme(&sparse_ensemble::METHOD, seed)
 }
 
 fn open(file: &[u8]) -> Selvedge<'_> {
@@ -81,7 +89,8 @@ fn varied(model: &MaterialModel, random: &mut Random) -> MaterialModel {
     let mut other = model.clone();
     for channel in &mut other.channels {
         channel.mean.iter_mut().for_each(|mean| mean.entries.iter_mut().for_each(|entry| *entry /= 2));
-        let Some(ensemble) = &mut channel.ensemble else { continue };
+    }
+    for ensemble in ensembles_mut(&mut other) {
         for dictionary in &mut ensemble.dictionaries {
             dictionary
                 .light
@@ -105,8 +114,8 @@ fn varied(model: &MaterialModel, random: &mut Random) -> MaterialModel {
 /// scales.
 fn exact_bound(models: [&MaterialModel; 3], channel: usize) -> f64 {
     let of_ensemble = |ensemble: &EnsembleModel| {
-        let of_layer = |layer: &selvedge_tools::format::model::CoefficientsModel| {
-            let of_record = |record: &selvedge_tools::format::model::RecordModel| {
+        let of_layer = |layer: &CoefficientsModel| {
+            let of_record = |record: &RecordModel| {
                 let atoms = &ensemble.atoms[record.dictionary as usize];
                 let parts = record
                     .coefficients
@@ -126,17 +135,17 @@ fn exact_bound(models: [&MaterialModel; 3], channel: usize) -> f64 {
     models
         .iter()
         .map(|model| {
-            let channel = &model.channels[channel];
+            let (c, channel) = (channel, &model.channels[channel]);
             let scale = channel.scale.as_ref().map_or(1.0, |scale| 2f64.powi(scale.shift as i32));
             let mean = channel.mean.as_ref().map_or(0.0, |mean| 2f64.powi(mean.shift as i32) + 2.0);
-            channel.ensemble.as_ref().map_or(0.0, of_ensemble) * scale + 2.0 * scale + mean
+            ensemble_of(model, c).map_or(0.0, of_ensemble) * scale + 2.0 * scale + mean
         })
         .sum()
 }
 
 /// The least shift of a channel's records that have coefficients.
 fn least_shift(model: &MaterialModel, channel: usize) -> u32 {
-    let ensemble = model.channels[channel].ensemble.iter();
+    let ensemble = ensemble_of(model, channel).into_iter();
     let records =
         ensemble.flat_map(|ensemble| ensemble.coefficients.iter().flatten()).flat_map(|c| &c.records);
     records.filter(|record| !record.coefficients.is_empty()).map(|record| record.shift).min().unwrap_or(31)
@@ -152,7 +161,7 @@ proptest! {
 
     #[test]
     fn the_ends_are_the_materials(seed in 0u64..1_000_000, exact: bool) {
-        let a = extreme_model(seed);
+        let a = extreme_ensemble(seed);
         let b = varied(&a, &mut Random::new(seed));
         let options = Blend { exact, ..Blend::default() };
         let [first, last] = [0.0, 1.0].map(|alpha| blend(&a, &b, alpha, options).expect("alike").0);
@@ -161,14 +170,14 @@ proptest! {
 
     #[test]
     fn exact_blends_lie_between(seed in 0u64..1_000_000, alpha in 0.01f64..0.99) {
-        let a = trim(&extreme_model(seed), &Trim { layers: Some(1), ..Trim::default() }).expect("a layer");
+        let a = trim(&extreme_ensemble(seed), &Trim { layers: Some(1), ..Trim::default() }).expect("a layer");
         let b = varied(&a, &mut Random::new(seed));
         let (blended, report) = match blend(&a, &b, alpha, Blend { exact: true, ..Blend::default() }) {
             Ok(blended) => blended,
             // Coefficients that fill a record to the brim at the coarsest shift.
             Err(error) => { prop_assert!(error.to_string().contains("beyond the format"), "{}", error); return Ok(()) }
         };
-        prop_assert_eq!(report, Report::default());
+        prop_assert_eq!(report, BlendReport::default());
         let found = largest_difference(&a, &b, alpha, &blended, 60);
         for (channel, found) in found.into_iter().enumerate() {
             // A texture is cut at its bound before the mean is added, and a record at its own if its shift is below 6
@@ -181,14 +190,14 @@ proptest! {
     /// Whatever is blended gives a legal file, or a refusal, and never more coefficients than asked for.
     #[test]
     fn any_blend_is_legal(seed in 0u64..1_000_000, alpha in 0.0f64..1.0, most in 1u32..40) {
-        let a = extreme_model(seed);
+        let a = extreme_ensemble(seed);
         let b = varied(&a, &mut Random::new(seed));
         let options = Blend { most: Some(most), value_bits: Some(most % 16 + 1), ..Blend::default() };
         match blend(&a, &b, alpha, options) {
             Ok((blended, report)) => {
                 open(&write_material(&blended));
                 prop_assert!(report.lost.is_finite() && report.outside >= 0.0 && report.energy.is_finite());
-                let records = blended.channels.iter().filter_map(|c| c.ensemble.as_ref()).flat_map(|e| e.coefficients.iter().flatten()).flat_map(|c| &c.records);
+                let records = ensembles(&blended).flat_map(|e| e.coefficients.iter().flatten()).flat_map(|c| &c.records);
                 prop_assert!(alpha == 0.0 || records.into_iter().all(|record| record.coefficients.len() <= most as usize));
             }
             Err(error) => prop_assert_eq!(error.exit_code(), 1),
@@ -260,7 +269,7 @@ fn shuffle(factor: &mut FactorModel, random: &mut Random) -> Vec<u32> {
 fn in_another_basis(model: &MaterialModel) -> MaterialModel {
     let mut random = Random::new(3);
     let mut other = model.clone();
-    for ensemble in other.channels.iter_mut().filter_map(|channel| channel.ensemble.as_mut()) {
+    for ensemble in ensembles_mut(&mut other) {
         for k in 0..ensemble.dictionaries.len() {
             let DictionaryModel { light, view, x, y } = &mut ensemble.dictionaries[k];
             let places = [light, view, x, y].map(|factor| shuffle(factor, &mut random));
@@ -322,7 +331,7 @@ fn the_stated_loss_is_that_of_decoded_values() {
     a.channels.iter_mut().for_each(|channel| channel.scale = None);
     let mut b = a.clone();
     // Blocks the other way round stand on other dictionaries.
-    for ensemble in b.channels.iter_mut().filter_map(|channel| channel.ensemble.as_mut()) {
+    for ensemble in ensembles_mut(&mut b) {
         ensemble.coefficients.iter_mut().flatten().for_each(|layer| layer.records.reverse());
     }
     for most in [None, Some(12)] {
@@ -352,7 +361,7 @@ fn the_stated_loss_is_that_of_decoded_values() {
 fn equal_dictionaries_add() {
     let a = excerpt();
     let mut b = a.clone();
-    for ensemble in b.channels.iter_mut().filter_map(|channel| channel.ensemble.as_mut()) {
+    for ensemble in ensembles_mut(&mut b) {
         ensemble.coefficients.iter_mut().flatten().for_each(|layer| layer.records.reverse());
     }
     let (blended, report) =
@@ -369,7 +378,7 @@ fn equal_dictionaries_add() {
 
 #[test]
 fn materials_that_differ_are_refused() {
-    let a = extreme_model(8);
+    let a = extreme_ensemble(8);
     let refuse = |b: MaterialModel, words: &str| {
         let error = blend(&a, &b, 0.5, Blend::default()).expect_err(words);
         assert!(error.exit_code() == 1 && error.to_string().contains(words), "{error}");

@@ -3,10 +3,11 @@
 
 use selvedge::{Finding, First, Limits};
 use selvedge_tests::setting;
-use selvedge_tools::check::example::example_model;
 use selvedge_tools::check::extreme::extreme_of_any_method;
-use selvedge_tools::format::write::{lay_out, repair_checksums, take_apart, write_material, write_split};
+use selvedge_tools::format::container::{lay_out, repair_checksums, take_apart};
+use selvedge_tools::format::write::{write_material, write_split};
 use selvedge_tools::math::random::Random;
+use selvedge_tools::methods::sparse_ensemble::example::example_model;
 
 fn example() -> Vec<u8> {
     write_material(&example_model())

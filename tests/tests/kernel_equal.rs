@@ -5,12 +5,13 @@
 
 use selvedge::{Direction, Limits, Selvedge};
 use selvedge_tests::{excerpt_folder, full_data_folder, setting};
-use selvedge_tools::check::example;
 use selvedge_tools::check::extreme::extreme_of_any_method;
 use selvedge_tools::format::write;
 use selvedge_tools::gpu::runner;
 use selvedge_tools::gpu::runner::{Answer, Gpu, Query, answer_on_cpu, direction_words, random_query};
 use selvedge_tools::math::random::Random;
+use selvedge_tools::methods::METHODS;
+use selvedge_tools::methods::sparse_ensemble::example::example_model;
 use selvedge_tools::methods::sparse_ensemble::sparsebtf;
 
 const ENTRIES: [&str; 4] = ["texel", "filtered", "trilinear", "floats"];
@@ -39,8 +40,7 @@ fn real_files() -> Vec<(Vec<u8>, Vec<u8>)> {
         let model = sparsebtf::read_material(&folder, name, None).and_then(|m| m.to_model(10)).expect("data");
         files.push((write::write_material(&model), Vec::new()));
     }
-    files.push((write::write_material(&example::example_model()), Vec::new()));
-    files.push((write::write_material(&example::tensor_example_model()), Vec::new()));
+    files.extend(METHODS.iter().map(|method| (write::write_material(&(method.example)()), Vec::new())));
     files
 }
 
@@ -191,7 +191,7 @@ fn a_planted_difference_is_found() {
     let Some(gpu) = adapter("vulkan") else { return };
     let files = real_files();
     let materials = open(&files[2..]);
-    let mut model = example::example_model();
+    let mut model = example_model();
     model.channels[0].mean.as_mut().expect("there").entries[0] += 1;
     let other = [(write::write_material(&model), Vec::new())];
     let loaded = gpu.load(&open(&other));

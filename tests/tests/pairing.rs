@@ -219,8 +219,9 @@ fn what_is_listed_as_one_sided_is() {
 #[test]
 fn a_material_is_its_words() {
     assert_eq!(size_of::<selvedge::Material>(), selvedge::material::MATERIAL_WORDS * 4);
-    let bytes =
-        selvedge_tools::format::write::write_material(&selvedge_tools::check::example::example_model());
+    let bytes = selvedge_tools::format::write::write_material(
+        &selvedge_tools::methods::sparse_ensemble::example::example_model(),
+    );
     let opened = selvedge::open(&bytes, &selvedge::Limits::NONE).expect("legal");
     let debug = format!("{:?}", opened.material());
     let numbers: Vec<u32> = debug

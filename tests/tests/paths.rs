@@ -3,10 +3,11 @@
 use proptest::prelude::*;
 use selvedge::batch::FilteredQuery;
 use selvedge::{Direction, Limits, Rgb, Selvedge};
-use selvedge_tools::check::example::example_model;
 use selvedge_tools::check::extreme::extreme_of_any_method;
+use selvedge_tools::format::texture::Kept;
 use selvedge_tools::format::write::{write_material, write_split};
 use selvedge_tools::math::random::Random;
+use selvedge_tools::methods::sparse_ensemble::example::example_model;
 
 fn direction(random: &mut Random) -> Direction {
     Direction {
@@ -88,10 +89,15 @@ proptest! {
         let layers = layers.min(model.layer_count);
         let whole = write_material(&model);
         model.layer_count = layers;
-        for ensemble in model.channels.iter_mut().filter_map(|channel| channel.ensemble.as_mut()) {
-            ensemble.coefficients.iter_mut().for_each(|level| level.truncate(layers as usize));
-        }
-        model.tensor.iter_mut().flat_map(|tensor| &mut tensor.lists).for_each(|level| level.truncate(layers as usize));
+        let all = |points: &[[i32; 2]]| (0..points.len() as u32).collect::<Vec<_>>();
+        let (lights, views) = (all(&model.lights), all(model.views()));
+        model.texture.keep(&Kept {
+            layers: layers as usize,
+            levels: model.level_count as usize,
+            channels: [true; 3],
+            lights: &lights,
+            views: &views,
+        });
         let trimmed = write_material(&model);
         let whole = selvedge::open(&whole, &Limits::NONE).expect("legal").with_layers(layers);
         let trimmed = selvedge::open(&trimmed, &Limits::NONE).expect("legal");
@@ -154,7 +160,7 @@ proptest! {
     #[test]
     fn decoding_and_encoding_is_the_identity(seed in 0u64..1_000_000) {
         let file = write_material(&extreme_of_any_method(seed));
-        let back = selvedge_tools::format::read::read_model(&file, None, &Limits::NONE).expect("legal");
+        let back = selvedge_tools::methods::read::read_model(&file, None, &Limits::NONE).expect("legal");
         prop_assert!(write_material(&back) == file);
     }
 }

@@ -1,7 +1,8 @@
 //! Specification, conformance table, code and example agree.
 
 use selvedge::Rule;
-use selvedge_tools::check::example::{example_model, hex_dump, tensor_example_model};
+use selvedge_tools::check::example::hex_dump;
+use selvedge_tools::methods::{sparse_ensemble, sparse_tensor};
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -108,8 +109,8 @@ fn the_conformance_table_has_a_row_for_every_rule() {
 #[test]
 fn the_worked_example_is_what_the_writer_makes() {
     let spec = read("spec/selvedge-1.md");
-    for (fence, model) in [("```hex", example_model()), ("```hex tensor", tensor_example_model())] {
-        let file = selvedge_tools::format::write::write_material(&model);
+    for (fence, method) in [("```hex", &sparse_ensemble::METHOD), ("```hex tensor", &sparse_tensor::METHOD)] {
+        let file = selvedge_tools::format::write::write_material(&(method.example)());
         let mut shown = BTreeSet::new();
         let mut inside = false;
         for line in spec.lines() {
@@ -136,7 +137,7 @@ fn the_worked_example_is_what_the_writer_makes() {
         }
         let opened = selvedge::open(&file, &selvedge::Limits::NONE).expect("legal");
         assert!(
-            spec.contains(&selvedge_tools::format::info::hex(&opened.decode_digest())),
+            spec.contains(&selvedge_tools::format::bits::hex(&opened.decode_digest())),
             "the decode digest of the example is another"
         );
         // Every byte but padding: a stranger can put the example together from the text. The second file

@@ -1,14 +1,19 @@
 //! The validator: it agrees with `open`, tells everything, and says the same as text, JSON and SARIF.
 
 use selvedge::{Limits, Rule};
-use selvedge_tools::check::example::example_model;
-use selvedge_tools::check::extreme::extreme_model;
+use selvedge_tools::check::extreme::extreme;
 use selvedge_tools::check::validate::{
     ADVICE, Options, Reports, Severity, files_of, sarif, schema, text, validate, validate_files,
 };
 use selvedge_tools::check::vectors::{Answer, read};
-use selvedge_tools::format::model::{AtomModel, MaterialModel};
-use selvedge_tools::format::write::{repair_checksums, write_material};
+use selvedge_tools::format::container::repair_checksums;
+use selvedge_tools::format::model::MaterialModel;
+use selvedge_tools::format::write::write_material;
+use selvedge_tools::methods::sparse_ensemble;
+use selvedge_tools::methods::sparse_ensemble::example::example_model;
+use selvedge_tools::methods::sparse_ensemble::model::{
+    AtomModel, CoefficientsModel, EnsembleModel, FactorModel, ensembles_mut,
+};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -83,8 +88,8 @@ fn unwise_files_are_told_what_is_unwise() {
         edit(&mut model);
         advised(&model)
     };
-    fn ensemble(model: &mut MaterialModel) -> &mut selvedge_tools::format::model::EnsembleModel {
-        model.channels[0].ensemble.as_mut().expect("full")
+    fn ensemble(model: &mut MaterialModel) -> &mut EnsembleModel {
+        ensembles_mut(model).next().expect("full")
     }
     assert_eq!(changed(&|m| ensemble(m).coefficients[0][0].records[1].coefficients[0].0 = 0), ["W1"]);
     let two = |m: &mut MaterialModel| {
@@ -101,17 +106,13 @@ fn unwise_files_are_told_what_is_unwise() {
         model.size = [128, 2];
         model.level_count = 1;
         let e = ensemble(&mut model);
-        e.dictionaries[0].view = selvedge_tools::format::model::FactorModel {
-            columns: 200,
-            entries: (0..1000).map(|i| i as i16).collect(),
-        };
+        e.dictionaries[0].view = FactorModel { columns: 200, entries: (0..1000).map(|i| i as i16).collect() };
         e.atoms[0] = (0..largest).map(|view| AtomModel { view, step: 9, ..AtomModel::default() }).collect();
         let mut one = e.coefficients[0][0].records[0].clone();
         one.coefficients = vec![(0, 3)];
         let mut records = vec![one.clone(); 64];
         records[7].coefficients = (0..largest).map(|i| (i, (i % 16) as u16)).collect();
-        e.coefficients =
-            vec![vec![selvedge_tools::format::model::CoefficientsModel { value_bits: 4, records }]];
+        e.coefficients = vec![vec![CoefficientsModel { value_bits: 4, records }]];
         advised(&model)
     };
     assert_eq!((wide(150), wide(20)), (vec!["W4", "W5"], vec!["W4"]));
@@ -142,7 +143,7 @@ fn severities_can_be_changed() {
 fn the_published_schema_is_that_of_the_reports() {
     let published = std::fs::read_to_string(root().join("spec/validation.schema.json")).expect("published");
     assert!(published == schema(), "selvedge validate --schema > spec/validation.schema.json");
-    let report = check(&write_material(&extreme_model(3))[..500]);
+    let report = check(&write_material(&extreme(&sparse_ensemble::METHOD, 3))[..500]);
     let reports =
         serde_json::to_value(Reports { format: "selvedge-validation-1", version: "0", files: vec![report] })
             .expect("plain");

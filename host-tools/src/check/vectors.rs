@@ -4,17 +4,15 @@
 //! one states the rule that is broken, where, and what is found there (1.4-4). What is stated comes from the
 //! recipe alone, never from a decoder.
 
-use crate::check::example::{example_model, tensor_example_model};
-use crate::check::extreme::{extreme_model, extreme_tensor};
+use crate::check::edits::{Edit, Number, place};
+use crate::check::extreme::extreme;
 use crate::error::{Result, ToolError};
 use crate::files;
-use crate::format::info::hex;
+use crate::format::bits::hex;
+use crate::format::container::{is_dictionary, repair_checksums, repair_header_checksum};
 use crate::format::model::MaterialModel;
-use crate::format::triangulate::{triangulate, with_grid};
-use crate::format::write::{
-    Part, directions_part, lay_out, repair_checksums, repair_header_checksum, take_apart, words_to_bytes,
-    write_dictionary, write_material, write_split,
-};
+use crate::format::write::{write_dictionary, write_material, write_split};
+use crate::methods::{by_name, by_number};
 use selvedge::Limits;
 use serde::Deserialize;
 use serde_json::Value;
@@ -40,7 +38,7 @@ struct Recipe {
     name: String,
     /// What it is for.
     note: String,
-    /// `example`, `extreme SEED`, or the name of another recipe whose model is taken.
+    /// `METHOD example`, `METHOD extreme SEED`, or the name of another recipe whose model is taken.
     #[serde(default = "example")]
     base: String,
     /// Which file of the model: `whole`, or `material` or `dictionary` where it is split in two.
@@ -63,8 +61,9 @@ struct Recipe {
     expect: Option<Expect>,
 }
 
+/// The base of most recipes.
 fn example() -> String {
-    "example".into()
+    "sparse-ensemble example".into()
 }
 
 #[derive(Clone, Copy, Debug, Default, Deserialize)]
@@ -83,68 +82,6 @@ enum Checksums {
     All,
     Header,
     None,
-}
-
-/// A number, or one in hexadecimal as text.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(untagged)]
-enum Number {
-    Plain(i64),
-    Text(String),
-}
-
-impl Number {
-    fn get(&self) -> Result<u32> {
-        let wide = match self {
-            Number::Plain(n) => Some(*n),
-            Number::Text(text) => text.strip_prefix("0x").and_then(|hex| i64::from_str_radix(hex, 16).ok()),
-        };
-        let fits = wide.filter(|n| (-(1i64 << 31)..1i64 << 32).contains(n));
-        fits.map(|n| n as u32).ok_or_else(|| ToolError::Usage(format!("{self:?} is no number of 32 bits")))
-    }
-}
-
-/// Four bytes a word, of a recipe.
-fn words_of(numbers: &[Number]) -> Result<Vec<u8>> {
-    Ok(words_to_bytes(&numbers.iter().map(Number::get).collect::<Result<Vec<u32>>>()?))
-}
-
-/// One change to the bytes. Places are `12`, `entry 0003.0000 + 4` or `section 0003.0000 + 48`.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(untagged, deny_unknown_fields)]
-enum Edit {
-    /// Writes a number of 1, 2 or 4 bytes.
-    Set { set: String, to: Number, width: Option<usize> },
-    /// Flips bits of a byte.
-    Flip { flip: String, bits: u8 },
-    /// Shortens the file to so many bytes.
-    Cut { cut: usize },
-    /// Adds zeros at its end.
-    Extend { extend: usize },
-    /// New words for a section; the file is laid out again.
-    Words { section: String, words: Vec<Number> },
-    /// More words at the end of a section.
-    Append { section: String, append: Vec<Number> },
-    /// Fewer bytes at the end of a section.
-    Drop { section: String, drop: usize },
-    /// Bytes `from` to `to` of a section, turned left.
-    Rotate { section: String, rotate: [usize; 3] },
-    /// A byte of a section; the file is laid out again.
-    Byte { section: String, byte: usize, to: u8 },
-    /// Takes a section away.
-    Remove { remove: String },
-    /// A new section.
-    Add { add: String, words: Vec<Number> },
-    /// A set of directions with triangles, hull and grid as given, or triangulated with a grid of this size.
-    Directions {
-        directions: u32,
-        points: Vec<[i32; 2]>,
-        triangles: Option<Vec<[u32; 3]>>,
-        hull: Option<Vec<u32>>,
-        grid: u32,
-    },
-    /// Digest and length of the external dictionary become those of a vector.
-    Reference { reference: String },
 }
 
 /// What a checker reports first.
@@ -207,173 +144,30 @@ impl Vector {
     }
 }
 
-/// A place in a file by its recipe's words.
-fn place(file: &[u8], text: &str) -> Result<usize> {
-    let bad = || ToolError::Usage(format!("`{text}` is no place of the file"));
-    let (base, add) = match text.split_once('+') {
-        Some((base, add)) => (base.trim(), add.trim().parse().map_err(|_| bad())?),
-        None => (text.trim(), 0usize),
-    };
-    if let Ok(offset) = base.parse::<usize>() {
-        return Ok(offset + add);
-    }
-    let (what, section) = base.split_once(' ').ok_or_else(bad)?;
-    let (kind, instance) = section_key(section)?;
-    let word = |at: usize| file.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-    let count = word(24).unwrap_or(0) as usize;
-    let entry = (0..count.min(4096))
-        .map(|i| 128 + i * 16)
-        .find(|&e| word(e) == Some(kind | instance << 16))
-        .ok_or_else(bad)?;
-    match what {
-        "entry" => Ok(entry + add),
-        "section" => Ok(word(entry + 4).ok_or_else(bad)? as usize + add),
-        _ => Err(bad()),
-    }
-}
-
-/// Kind and instance of `0113.0000`.
-fn section_key(text: &str) -> Result<(u32, u32)> {
-    let parts = text
-        .split_once('.')
-        .map(|(kind, instance)| (u32::from_str_radix(kind, 16), u32::from_str_radix(instance, 16)));
-    let Some((Ok(kind), Ok(instance))) = parts else {
-        return Err(ToolError::Usage(format!("`{text}` is no section")));
-    };
-    Ok((kind, instance))
-}
-
-impl Edit {
-    /// Whether places of later edits and of the expectation are looked up behind this edit.
-    fn moves(&self) -> bool {
-        !matches!(self, Edit::Set { .. } | Edit::Flip { .. } | Edit::Cut { .. } | Edit::Extend { .. })
-    }
-
-    fn apply(&self, file: &mut Vec<u8>, made: &BTreeMap<String, Vector>) -> Result<()> {
-        let outside = || ToolError::Usage(format!("{self:?} lies outside the file"));
-        match self {
-            Edit::Set { set, to, width } => {
-                let (at, width, value) = (place(file, set)?, width.unwrap_or(4), to.get()?.to_le_bytes());
-                let slot = file.get_mut(at..at + width).ok_or_else(outside)?;
-                let new = value.get(..width).ok_or_else(outside)?;
-                if slot == new {
-                    return Err(ToolError::Usage(format!("{self:?} changes nothing")));
-                }
-                slot.copy_from_slice(new);
-            }
-            Edit::Flip { flip, bits } => {
-                let at = place(file, flip)?;
-                *file.get_mut(at).ok_or_else(outside)? ^= bits;
-            }
-            Edit::Cut { cut } => file.truncate(*cut),
-            Edit::Extend { extend } => file.resize(file.len() + extend, 0),
-            Edit::Remove { remove } => {
-                let key = section_key(remove)?;
-                with_parts(file, |parts| parts.retain(|part| (part.kind, part.instance) != key));
-            }
-            Edit::Add { add, words } => {
-                let ((kind, instance), bytes) = (section_key(add)?, words_of(words)?);
-                with_parts(file, |parts| parts.push(Part { kind, instance, bytes }));
-            }
-            Edit::Words { section, words } => *section_of(file, section)? = words_of(words)?,
-            Edit::Append { section, append } => section_of(file, section)?.extend(words_of(append)?),
-            Edit::Drop { section, drop } => {
-                let mut bytes = section_of(file, section)?;
-                let left = bytes.len().checked_sub(*drop).ok_or_else(outside)?;
-                bytes.truncate(left);
-            }
-            Edit::Rotate { section, rotate: [from, to, by] } => {
-                section_of(file, section)?.get_mut(*from..*to).ok_or_else(outside)?.rotate_left(*by)
-            }
-            Edit::Byte { section, byte, to } => {
-                *section_of(file, section)?.get_mut(*byte).ok_or_else(outside)? = *to
-            }
-            Edit::Directions { directions, points, triangles, hull, grid } => {
-                let own = triangulate(points, None);
-                let t = with_grid(
-                    points,
-                    triangles.clone().unwrap_or(own.triangles),
-                    hull.clone().unwrap_or(own.hull),
-                    *grid,
-                );
-                *section_of(file, &format!("0003.{directions:04x}"))? =
-                    directions_part(*directions, points, &t).bytes;
-            }
-            Edit::Reference { reference } => {
-                let other = made.get(reference).ok_or_else(|| {
-                    ToolError::Usage(format!("{reference}: no recipe before this one has the name"))
-                })?;
-                let words = words_to_bytes(&[other.bytes.len() as u32, 0, 0, 0]);
-                *section_of(file, "0002.0000")? = [&selvedge::sha256(&other.bytes)[..], &words].concat();
-            }
+/// The model of a base.
+fn base_of(base: &str, models: &BTreeMap<String, MaterialModel>) -> Result<MaterialModel> {
+    let words: Vec<&str> = base.split(' ').collect();
+    match words.as_slice() {
+        [method, "example"] => Ok((by_name(method)?.example)()),
+        [method, "extreme", seed] => {
+            let seed = seed.parse().map_err(|_| ToolError::Usage(format!("`{seed}` is no seed")))?;
+            Ok(extreme(by_name(method)?, seed))
         }
-        Ok(())
+        _ => {
+            let missing = || ToolError::Usage(format!("no recipe before this one is `{base}`"));
+            models.get(base).cloned().ok_or_else(missing)
+        }
     }
 }
 
-/// Changes the sections of a file and lays it out again.
-fn with_parts(file: &mut Vec<u8>, change: impl FnOnce(&mut Vec<Part>)) {
-    let (header, mut parts) = take_apart(file);
-    change(&mut parts);
-    *file = lay_out(header, parts);
-}
-
-/// The bytes of a section; the file is laid out again when they are let go.
-struct SectionBytes<'a> {
-    file: &'a mut Vec<u8>,
-    header: [u32; 32],
-    parts: Vec<Part>,
-    at: usize,
-}
-
-fn section_of<'a>(file: &'a mut Vec<u8>, section: &str) -> Result<SectionBytes<'a>> {
-    let key = section_key(section)?;
-    let (header, parts) = take_apart(file);
-    let at = parts.iter().position(|part| (part.kind, part.instance) == key);
-    let at = at.ok_or_else(|| ToolError::Usage(format!("the file has no section {section}")))?;
-    Ok(SectionBytes { file, header, parts, at })
-}
-
-impl std::ops::Deref for SectionBytes<'_> {
-    type Target = Vec<u8>;
-
-    fn deref(&self) -> &Vec<u8> {
-        &self.parts[self.at].bytes
-    }
-}
-
-impl std::ops::DerefMut for SectionBytes<'_> {
-    fn deref_mut(&mut self) -> &mut Vec<u8> {
-        &mut self.parts[self.at].bytes
-    }
-}
-
-impl Drop for SectionBytes<'_> {
-    fn drop(&mut self) {
-        *self.file = lay_out(self.header, std::mem::take(&mut self.parts));
-    }
-}
-
-/// The model of a base, changed.
+/// The model of a recipe: its base, changed.
 fn model_of(recipe: &Recipe, models: &BTreeMap<String, MaterialModel>) -> Result<MaterialModel> {
     let wrong = |why: String| ToolError::Usage(format!("{}: {why}", recipe.name));
-    let base = match recipe.base.split_once(' ') {
-        _ if recipe.base == "example" => example_model(),
-        _ if recipe.base == "tensor example" => tensor_example_model(),
-        Some(("extreme-tensor", seed)) => {
-            extreme_tensor(seed.parse().map_err(|_| wrong(format!("`{seed}` is no seed")))?)
-        }
-        Some(("extreme", seed)) => {
-            extreme_model(seed.parse().map_err(|_| wrong(format!("`{seed}` is no seed")))?)
-        }
-        _ => models
-            .get(&recipe.base)
-            .cloned()
-            .ok_or_else(|| wrong(format!("no recipe before this one is `{}`", recipe.base)))?,
-    };
+    let base = base_of(&recipe.base, models).map_err(|error| wrong(error.to_string()))?;
     if recipe.change.is_empty() {
         return Ok(base);
     }
+    let method = by_number(base.method()).map_err(|finding| wrong(finding.to_string()))?;
     let mut value = serde_json::to_value(&base).map_err(|error| wrong(error.to_string()))?;
     for (pointer, new) in &recipe.change {
         let slot = value.pointer_mut(pointer).ok_or_else(|| wrong(format!("the model has no {pointer}")))?;
@@ -382,7 +176,10 @@ fn model_of(recipe: &Recipe, models: &BTreeMap<String, MaterialModel>) -> Result
         }
         *slot = new.clone();
     }
-    serde_json::from_value(value).map_err(|error| wrong(error.to_string()))
+    let mut model: MaterialModel<Value> =
+        serde_json::from_value(value).map_err(|error| wrong(error.to_string()))?;
+    let texture = (method.from_json)(model.texture.take()).map_err(|error| wrong(error.to_string()))?;
+    Ok(model.with_texture(texture))
 }
 
 /// Name of a part in a manifest.
@@ -392,7 +189,7 @@ fn part_name(part: selvedge::Part) -> &'static str {
 
 /// What this decoder says of a vector.
 pub fn answer(bytes: &[u8], dictionary: Option<&[u8]>, limits: &Limits) -> Answer {
-    if crate::format::info::is_dictionary(bytes) {
+    if is_dictionary(bytes) {
         let mut first = selvedge::First::default();
         selvedge::validate(bytes, dictionary, limits, &mut first);
         return match first.0 {
@@ -453,13 +250,14 @@ fn make_one(
         FilePart::Material => write_split(model).0,
         FilePart::Dictionary => write_dictionary(&MaterialModel { extras: Vec::new(), ..model.clone() }),
     };
+    let bytes_of = |name: &str| made.get(name).map(|vector| &vector.bytes[..]);
     let moving = recipe.bytes.iter().rposition(Edit::moves).map_or(0, |last| last + 1);
     for edit in &recipe.bytes[..moving] {
-        edit.apply(&mut bytes, made)?;
+        edit.apply(&mut bytes, &bytes_of)?;
     }
     let whole = bytes.clone();
     for edit in &recipe.bytes[moving..] {
-        edit.apply(&mut bytes, made)?;
+        edit.apply(&mut bytes, &bytes_of)?;
     }
     match recipe.checksums {
         Checksums::All if !recipe.bytes.is_empty() => repair_checksums(&mut bytes),

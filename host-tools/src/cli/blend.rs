@@ -3,8 +3,10 @@
 use super::common::warn_of_triangles;
 use crate::error::{Result, ToolError};
 use crate::files;
-use crate::format::{read, write};
-use crate::methods::sparse_ensemble::blend::{Blend, blend};
+use crate::format::blend::blend;
+use crate::format::texture::Blend;
+use crate::format::write;
+use crate::methods::read;
 use clap::Args;
 use selvedge::Limits;
 use std::path::{Path, PathBuf};
@@ -43,7 +45,7 @@ pub fn run(args: Arguments) -> Result<u8> {
         let file = selvedge::open_with(&bytes, dictionary.as_deref(), &Limits::NONE);
         let file = file.map_err(|finding| ToolError::Invalid { path: path.to_owned(), finding })?;
         warn_of_triangles(path, &file);
-        Ok(read::model_of(&file))
+        read::model_of(&file).map_err(|finding| ToolError::Invalid { path: path.to_owned(), finding })
     };
     let options =
         Blend { exact: args.exact, most: args.most, scales_apart: args.scales_apart, ..Blend::default() };

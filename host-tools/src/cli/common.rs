@@ -3,7 +3,7 @@
 use crate::data::dataset::Dataset;
 use crate::error::{Result, ToolError};
 use crate::files;
-use crate::format::read;
+use crate::methods::read;
 use clap::Args;
 use selvedge::header::CONTENT_DICTIONARY;
 use selvedge::{Limits, Selvedge};
@@ -66,6 +66,12 @@ pub fn print(text: &str) -> Result<()> {
 /// Anything as JSON, to stdout.
 pub fn print_json(value: &impl serde::Serialize) -> Result<()> {
     print(&(serde_json::to_string_pretty(value).expect("plain data") + "\n"))
+}
+
+/// A finding about a source's file.
+pub fn invalid(source: &FileArgs) -> impl FnOnce(selvedge::Finding) -> ToolError {
+    let path = source.file.clone();
+    |finding| ToolError::Invalid { path, finding }
 }
 
 /// A material's bytes, opened for as long as `use_it` runs.

@@ -1,6 +1,6 @@
 //! `explain`: which parts of a file made a sample.
 
-use super::common::{FileArgs, print, print_json, with_material};
+use super::common::{FileArgs, invalid, print, print_json, with_material};
 use super::parse;
 use crate::check::explain;
 use crate::error::{Result, ToolError};
@@ -38,7 +38,8 @@ pub fn run(args: Arguments) -> Result<u8> {
             let [width, height] = size;
             return Err(ToolError::Usage(format!("--texel: the image has {width} x {height} texels")));
         }
-        let explanation = explain::explain(&material, texel, args.light, args.view);
+        let explanation = explain::explain(&material, texel, args.light, args.view)
+            .map_err(invalid(&args.source))?;
         if args.json {
             print_json(&explanation)?
         } else {

@@ -1,9 +1,9 @@
 //! `info`: what a file, a dataset or third-party data are.
 
-use super::common::{FileArgs, print, print_json, with_material};
+use super::common::{FileArgs, invalid, print, print_json, with_material};
 use crate::error::Result;
 use crate::foreign::{self, Kind};
-use crate::format::info;
+use crate::check::info;
 use clap::Args;
 use std::path::Path;
 
@@ -24,7 +24,7 @@ pub fn run(args: Arguments) -> Result<u8> {
     let is_stream = source.file == Path::new("-");
     match if is_stream { Kind::Material } else { foreign::detect(&source.file)? } {
         Kind::Material | Kind::Dictionary => with_material(source, |material| {
-            let info = info::info(&material);
+            let info = info::info(&material).map_err(invalid(&args.source))?;
             if json {
                 print_json(&info)?
             } else {

@@ -1,9 +1,9 @@
 //! `trim`: leaves out what a scene does not need.
 
-use super::common::{FileArgs, with_material};
+use super::common::{invalid, FileArgs, with_material};
 use crate::error::{Result, ToolError};
 use crate::files;
-use crate::format::read;
+use crate::methods::read;
 use crate::format::sector::Sector;
 use crate::format::trim::{Keep, Trim, trim};
 use crate::format::write;
@@ -73,7 +73,7 @@ pub fn run(args: Arguments) -> Result<u8> {
                 args.source.file.display()
             )));
         }
-        Ok(read::model_of(&file))
+        read::model_of(&file).map_err(invalid(&args.source))
     })?;
     let channels = args.channels.unwrap_or(Trim::default().channels);
     let options = Trim {

@@ -11,7 +11,6 @@
 pub mod auto;
 pub mod encoder;
 pub mod goal;
-pub mod means;
 pub mod parse;
 
 use crate::methods::sparse_ensemble::encode::encoder::SparseEnsemble;

@@ -20,7 +20,7 @@ pub mod ubo;
 use crate::data::dataset::{Dataset, Description, Sample, Statistics, Writer, first_beyond};
 use crate::data::directions;
 use crate::error::{Result, ToolError};
-use crate::format::info;
+use crate::format::container::is_dictionary;
 use crate::math::linear::ordered;
 use crate::methods::sparse_ensemble::sparsebtf;
 use btf::Btf;
@@ -156,7 +156,7 @@ pub fn detect(path: &Path) -> Result<Kind> {
         .read_to_end(&mut start)
         .map_err(ToolError::io(path))?;
     if start.starts_with(&selvedge::header::MAGIC) {
-        Ok(if info::is_dictionary(&start) { Kind::Dictionary } else { Kind::Material })
+        Ok(if is_dictionary(&start) { Kind::Dictionary } else { Kind::Material })
     } else if Dataset::is_one(path) {
         Ok(Kind::Dataset)
     } else if btf::is_one(&start) {

@@ -13,11 +13,10 @@
 
 use crate::error::{Result, ToolError};
 use crate::format::triangulate::{Triangulation, triangulate};
+use crate::format::units::ONE_Q14;
 use selvedge::Direction;
 use selvedge::direction::{cross, dot_product};
 
-/// Radius of the disc, Q14.
-const ONE_Q14: f64 = 16_384.0;
 /// What the sector is widened by, Q14: more than the rounding of a query to its coarse point (5.4-6).
 const MARGIN: f64 = 2.0;
 

@@ -3,6 +3,7 @@
 //! The Delaunay subdivision of exact integer points is unique. Where more than three points lie on one
 //! empty circle it has a larger face, which is split as a fan from its lowest direction.
 
+use crate::format::units::ONE_Q14;
 use selvedge::direction_set::{cell_range, meets_cell};
 use spade::{DelaunayTriangulation, Point2, Triangulation as _};
 use std::collections::BTreeMap;
@@ -153,7 +154,7 @@ fn line_hull(points: &[[i32; 2]]) -> Vec<u32> {
 /// The Q14 point of the disc for a unit vector of the upper hemisphere: the nearest, or where that leaves the
 /// disc the one towards its centre (5.1-1).
 pub fn project(vector: glam::DVec3) -> [i32; 2] {
-    let scale = 16384.0 / (1.0 + vector.z);
+    let scale = ONE_Q14 / (1.0 + vector.z);
     let exact = [vector.x * scale, vector.y * scale];
     let nearest = exact.map(|c| c.round() as i32);
     let inside = nearest[0] * nearest[0] + nearest[1] * nearest[1] <= 1 << 28;
@@ -162,7 +163,7 @@ pub fn project(vector: glam::DVec3) -> [i32; 2] {
 
 /// The unit vector of a Q14 point of the disc.
 pub fn unproject(point: [i32; 2]) -> glam::DVec3 {
-    let [x, y] = point.map(|c| c as f64 / 16384.0);
+    let [x, y] = point.map(|c| c as f64 / ONE_Q14);
     let square = x * x + y * y;
     glam::DVec3::new(2.0 * x, 2.0 * y, 1.0 - square) / (1.0 + square)
 }

@@ -86,7 +86,8 @@ impl Operations {
     /// Of a file.
     pub fn of_file(file: &Selvedge<'_>) -> Operations {
         Operations::of_random(Some(file.header().operations), |q| {
-            count::filtered(file, 0, q.u_q32, q.v_q32, q.light, q.view).operations
+            let counted = count::filtered(file, 0, q.u_q32, q.v_q32, q.light, q.view);
+            counted.expect("a method of these tools").operations
         })
     }
 

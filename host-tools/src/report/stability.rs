@@ -5,7 +5,7 @@
 //! where its bound comes from, and measures. Nothing is left out silently: a case that cannot be made is a
 //! failure. `selvedge report --stability` puts the table on a page.
 
-use crate::check::extreme::{extreme_model, extreme_tensor};
+use crate::check::extreme::extreme;
 use crate::data::dataset::{Dataset, Description, Sample};
 use crate::data::directions;
 use crate::encode::goal::Target;
@@ -17,6 +17,7 @@ use crate::math::linear::{eigenbasis, nearest_orthogonal, orthonormal, product_a
 use crate::math::random::Random;
 use crate::measure::baseline::pca::{Domain, pca};
 use crate::measure::compare::{Source, compare, query};
+use crate::methods::METHODS;
 use crate::methods::sparse_ensemble::encode::{self, prepare};
 use crate::methods::sparse_tensor;
 use crate::methods::sparse_tensor::encode::fit;
@@ -511,7 +512,7 @@ fn largest_legal() -> Vec<Case> {
             |_| {
                 let mut measured = 0.0f64;
                 for seed in 0..40 {
-                    let bytes = write_material(&extreme_tensor(seed));
+                    let bytes = write_material(&extreme(&sparse_tensor::METHOD, seed));
                     let file = opened(&bytes)?;
                     measured = measured.max(largest_fibre_sum(&file));
                 }
@@ -527,7 +528,7 @@ fn largest_legal() -> Vec<Case> {
                 let mut random = Random::new(8);
                 let (mut measured, mut samples) = (0.0f64, 0.0);
                 for seed in 0..40 {
-                    let bytes = write_material(&extreme_tensor(seed));
+                    let bytes = write_material(&extreme(&sparse_tensor::METHOD, seed));
                     let file = opened(&bytes)?;
                     for _ in 0..if file.material().full_count > 0 { 200 } else { 0 } {
                         let (light, view) = (
@@ -547,18 +548,17 @@ fn largest_legal() -> Vec<Case> {
             },
         ),
     ];
-    for (name, make) in [("ensemble", extreme_model as fn(u64) -> _), ("tensor", extreme_tensor)] {
+    for &method in METHODS {
         cases.push(case(
             "largest legal",
-            format!("sparse {name}: values of extreme files"),
+            format!("{}: values of extreme files", method.title),
             "samples",
             "11.1: no colour that is not a finite number, or negative",
             move |_| {
                 let mut random = Random::new(9);
                 let (mut measured, mut samples) = (0.0f64, 0.0);
                 for seed in 0..40 {
-                    let model = make(seed);
-                    let bytes = write_material(&model);
+                    let bytes = write_material(&extreme(method, seed));
                     let file = opened(&bytes)?;
                     for _ in 0..300 {
                         let (light, view) = (direction(upward(&mut random)), direction(upward(&mut random)));

@@ -2,11 +2,12 @@
 //! imported from the excerpt in the repository; all files are validated, decoded on CPU and GPU and compared
 //! word for word, measured against their data, and shown.
 
+use crate::check::info;
 use crate::check::validate;
 use crate::data::picture::{Picture, false_colour};
 use crate::error::{Result, ToolError};
 use crate::files;
-use crate::format::info;
+use crate::format::bits::hex;
 use crate::format::write;
 use crate::methods::sparse_ensemble::sparsebtf::{AuthorsMaterial, read_material};
 use crate::show::ball::{decode_picture, render_ball};
@@ -238,7 +239,7 @@ pub fn run(out: &Path, say: &mut dyn FnMut(String)) -> Result<()> {
             "{}: {} findings, decode digest {}",
             path.display(),
             report.count(),
-            &info::hex(&opened.decode_digest())[..16]
+            &hex(&opened.decode_digest())[..16]
         ));
         materials.push(opened);
     }
@@ -288,7 +289,7 @@ pub fn run(out: &Path, say: &mut dyn FnMut(String)) -> Result<()> {
 fn page(materials: &[Selvedge<'_>], imported: usize, story: &str, rows: &str, gpu_line: &str) -> String {
     let facts: String = materials
         .iter()
-        .map(|material| format!("<pre>{}</pre>", info::info_text(&info::info(material))))
+        .filter_map(|material| Some(format!("<pre>{}</pre>", info::info_text(&info::info(material).ok()?))))
         .collect();
     let tiles: String = materials[..imported]
         .iter()

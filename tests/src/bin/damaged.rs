@@ -8,7 +8,8 @@ use selvedge_tests::targets::suite;
 use selvedge_tools::check::extreme::extreme_of_any_method;
 use selvedge_tools::check::vectors::{Answer, Vector, answer, manifest};
 use selvedge_tools::files;
-use selvedge_tools::format::write::{repair_checksums, write_material};
+use selvedge_tools::format::container::repair_checksums;
+use selvedge_tools::format::write::write_material;
 use selvedge_tools::math::random::Random;
 use std::path::Path;
 

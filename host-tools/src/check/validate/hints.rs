@@ -1,9 +1,16 @@
 //! What to do about a broken rule.
 
+use crate::methods::METHODS;
 use selvedge::Rule;
 
 /// A few words for whoever has the file; empty where the rule says it all.
 pub fn hint(rule: Rule) -> &'static str {
+    let of_methods = METHODS.iter().flat_map(|method| method.hints);
+    of_methods.into_iter().find(|(of, _)| *of == rule).map_or_else(|| shared_hint(rule), |(_, hint)| hint)
+}
+
+/// Hints on the rules of the chapters that methods share.
+fn shared_hint(rule: Rule) -> &'static str {
     match rule {
         Rule::HeaderTooShort => "the file is empty or was cut; copy it again",
         Rule::Magic => "this is no Selvedge file, or line ends were translated on the way; copy it as binary",
@@ -26,8 +33,8 @@ pub fn hint(rule: Rule) -> &'static str {
             "raise --max-operations, or make a cheaper file: selvedge encode --operations"
         }
         Rule::LimitTexels => "raise --max-texels if the file can be trusted",
-        Rule::SectionPadding | Rule::HeaderReserved | Rule::StreamEnd | Rule::ListsEnd => {
-            "canonical files have zeros there; write the file anew"
+        Rule::SectionPadding | Rule::HeaderReserved => {
+            "canonical files have zeros there; write the file again"
         }
         Rule::SectionMissing => {
             "a part of the material is lost; what was found is its kind and, in the upper half, its instance"
@@ -37,7 +44,7 @@ pub fn hint(rule: Rule) -> &'static str {
         }
         Rule::MetadataText => "strings are plain UTF-8 without line ends",
         Rule::ExternalMissing => "give the dictionary with --dictionary",
-        Rule::ExternalUnwanted => "this file carries its own dictionary; leave --dictionary out",
+        Rule::ExternalUnwanted => "this file embeds its dictionary; leave --dictionary out",
         Rule::ExternalDigest => "this is another dictionary than that which the material was made with",
         Rule::ExternalFit => "the dictionary was made for other directions, channels or blocks",
         Rule::DirectionPoint => "directions are different points of the unit disc (5.1)",
@@ -45,15 +52,12 @@ pub fn hint(rule: Rule) -> &'static str {
             "derived numbers are computed by the rules, by integers"
         }
         Rule::TriangleOrder | Rule::TriangleShape | Rule::HullConvex | Rule::HullEdge | Rule::Cover => {
-            "triangulate the directions anew (5.8)"
+            "triangulate the directions again (5.8)"
         }
         Rule::GridStarts | Rule::GridCandidate | Rule::GridComplete => {
-            "make the grid anew from the triangles (5.5)"
+            "rebuild the grid from the triangles (5.5)"
         }
         Rule::GridCell => "a finer grid lists fewer triangles in a cell",
-        Rule::RecordSum | Rule::ListSum => "put a part of the coefficients into another layer",
-        Rule::FibreSum => "halve the values of the ABRDF atom's fibres and take one from its angular shift",
-        Rule::RecordZeros => "write positions with more low bits",
         Rule::StatedOperations => "compute the cost by 4.2-1 from the largest records",
         _ => "",
     }

@@ -1,4 +1,4 @@
-//! `validate`: every finding of a file, as the core's own checker tells it, and what is legal but unwise.
+//! `validate`: every finding of a file, as the core's own checker reports it, and what is legal but wasteful.
 //!
 //! There is no second parser: [`selvedge::open_telling`] is `open` with a sink that goes on. What this module
 //! adds is words: severity, hints, counts, and reports as text, JSON ([`Reports`] is the published schema)
@@ -8,12 +8,14 @@ mod advice;
 mod hints;
 mod sarif;
 
-pub use advice::{ADVICE, Advice};
+pub use advice::ADVICE;
 pub use hints::hint;
 pub use sarif::sarif;
 
 use crate::error::{Result, ToolError, exit_code_of};
 use crate::files;
+use crate::format::container::is_dictionary;
+use crate::methods::advice::Advice;
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use selvedge::{Family, Finding, Limits, Part, Rule};
@@ -188,14 +190,14 @@ pub fn validate(name: &str, bytes: &[u8], dictionary: Option<&[u8]>, options: &O
         });
         true
     };
-    let (valid, opened) = if crate::format::info::is_dictionary(bytes) {
+    let (valid, opened) = if is_dictionary(bytes) {
         (selvedge::validate(bytes, dictionary, &options.limits, &mut sink), None)
     } else {
         let opened = selvedge::open_telling(bytes, dictionary, &options.limits, &mut sink);
         (opened.is_some(), opened)
     };
     if let Some(opened) = opened {
-        advice::walk(&opened, &mut |advice: &Advice, offset, found| {
+        let walked = advice::walk(&opened, &mut |advice: &'static Advice, offset, found| {
             let severity = options.severity(advice.id, advice.name, Severity::Warning);
             tell(advice.id, severity, 3, &|| Report {
                 rule: advice.id,
@@ -209,6 +211,10 @@ pub fn validate(name: &str, bytes: &[u8], dictionary: Option<&[u8]>, options: &O
                 hint: advice.hint,
             });
         });
+        if let Err(finding) = walked {
+            report.unreadable = Some(finding.to_string());
+            report.exit_code = exit_code_of(finding.rule);
+        }
     }
     report.valid = valid;
     report
@@ -256,7 +262,7 @@ pub fn validate_files(
 ) -> Result<()> {
     let check = |path: &PathBuf| match files::read(path) {
         Ok(bytes) => {
-            let own = dictionary.filter(|_| !crate::format::info::is_dictionary(&bytes));
+            let own = dictionary.filter(|_| !is_dictionary(&bytes));
             validate(&path.display().to_string(), &bytes, own, options)
         }
         Err(error) => {

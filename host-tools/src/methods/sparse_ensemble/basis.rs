@@ -5,7 +5,8 @@
 //! change for a mode is the least-squares solution over the columns that are there; what lies outside of
 //! their span is lost, and measured.
 
-use crate::format::model::{AtomModel, DictionaryModel, FactorModel};
+use crate::format::units::ONE_Q15;
+use crate::methods::sparse_ensemble::model::{AtomModel, DictionaryModel, FactorModel};
 
 /// Coefficients on atoms, of which only the columns count.
 pub type Sparse = Vec<(AtomModel, f64)>;
@@ -52,7 +53,7 @@ fn columns_of(factor: &FactorModel) -> Vec<Vec<f64>> {
     let count = factor.columns as usize;
     (0..count)
         .map(|column| {
-            factor.entries.iter().skip(column).step_by(count).map(|&entry| entry as f64 / 32_768.0).collect()
+            factor.entries.iter().skip(column).step_by(count).map(|&entry| entry as f64 / ONE_Q15).collect()
         })
         .collect()
 }

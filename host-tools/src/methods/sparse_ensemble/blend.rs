@@ -1,195 +1,54 @@
-//! Blends of two materials in the space of their coefficients (SparseBTF 2023, section 3.5).
+//! Blends of sparse ensembles in the space of their coefficients (SparseBTF 2023, section 3.5).
 //!
-//! The values of a channel become `(1 - alpha) a + alpha b`: for log files radiance moves geometrically.
-//! Means blend entry by entry. Records blend block by block, level by level and layer by layer:
+//! Records blend block by block, level by level and layer by layer:
 //!
 //! - on equal dictionaries coefficients add (equation 7);
 //! - on different ones the record with less energy is projected into the span of the other's dictionary
-//!   (equations 8 and 9), and the largest coefficients stay; [`Report`] says what was lost;
+//!   (equations 8 and 9), and the largest coefficients stay; [`BlendReport`] says what was lost;
 //! - with [`Blend::exact`] both records stay as they are, side by side in layers of their own: the sample
 //!   costs the sum of both, and nothing is lost but the rounding of quantisers.
-//!
-//! With an alpha of 0 or 1 the result is one of the two models as it is.
 
 use crate::error::{Result, ToolError};
-use crate::format::model::{
-    AtomModel, ChannelModel, CoefficientsModel, DictionaryModel, EnsembleModel, MaterialModel, MetadataModel,
-    PairTableModel, RecordModel, TransferModel,
-};
-use crate::format::trim::drop_unused;
+use crate::format::texture::{Blend, BlendReport};
 use crate::methods::sparse_ensemble::basis::{Basis, Change, Sparse};
-use crate::methods::sparse_ensemble::quantise::{FloatRecord, quantise, quantise_means, quantise_scales};
+use crate::methods::sparse_ensemble::model::{
+    AtomModel, CoefficientsModel, DictionaryModel, EnsembleModel, EnsembleTexture, RecordModel,
+};
+use crate::methods::sparse_ensemble::quantise::{FloatRecord, quantise};
+use crate::methods::sparse_ensemble::trim::drop_unused;
 use rayon::prelude::*;
 use selvedge::ensemble::dequantise;
 use selvedge::ensemble_set::{DICTIONARY_LIMIT, SUM_LIMIT};
 use std::collections::BTreeMap;
 
-/// Most layers of a file (3.1-13).
-const LAYER_LIMIT: u32 = 8;
 /// Most coefficients of a record, by the width of its count (10.3-3).
 const COUNT_LIMIT: usize = 32_767;
 
-/// How to blend.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Blend {
-    /// No change of basis: the layers of both, one of `a` and one of `b` in turn.
-    pub exact: bool,
-    /// Most coefficients of a record after a change of basis or a sum; as many as both have if `None`.
-    pub most: Option<u32>,
-    /// Bits of a value; the larger number of both if `None`. Exact blends keep the bits that there are.
-    pub value_bits: Option<u32>,
-    /// Blend textures and scales apart where scales differ. This is how normalised materials are blended in
-    /// the paper; values then move smoothly from one to the other, but not linearly.
-    pub scales_apart: bool,
-}
+/// Largest magnitude of a weighted range, with room for the rounding of its base.
+const LARGEST: f64 = 32_766.0;
 
-/// What a change of basis cost, over all blocks, layers and levels.
-///
-/// Energies are sums of squares of textures before scales, over all texels of blocks and all pairs of
-/// sample directions.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Report {
-    /// Records that are a sum on one dictionary, or of one material alone.
-    pub summed: u64,
-    /// Records that took a change of basis.
-    pub changed: u64,
-    /// Energy of the blended textures as they should be; of an exact blend it is not formed.
-    pub energy: f64,
-    /// Energy outside of the span of the dictionaries that were kept.
-    pub outside: f64,
-    /// Energy of the whole difference: outside of the span, or beyond the number of coefficients.
-    pub lost: f64,
-}
-
-/// `(1 - alpha) a + alpha b`.
+/// `(1 - alpha) a + alpha b` of the channels that both have.
 ///
 /// # Errors
-/// [`ToolError::Usage`] if alpha is not 0 to 1, or if the two do not agree in image size, block edge, levels,
-/// directions, channel states, transfer and its offset or exponent, cosine flag and colour matrix; in scales,
-/// unless they are to be blended apart; or if the result is beyond the format.
+/// [`ToolError::Usage`] if the result is beyond the format.
 pub fn blend(
-    a: &MaterialModel,
-    b: &MaterialModel,
+    a: &EnsembleTexture,
+    b: &EnsembleTexture,
     alpha: f64,
     options: Blend,
-) -> Result<(MaterialModel, Report)> {
-    if !(0.0..=1.0).contains(&alpha) {
-        return Err(ToolError::Usage(format!("alpha is 0 to 1, not {alpha}")));
-    }
-    agree(a, b, options)?;
-    if alpha == 0.0 || alpha == 1.0 {
-        return Ok((if alpha == 0.0 { a } else { b }.clone(), Report::default()));
-    }
-    let full = a.channels.iter().any(|channel| channel.ensemble.is_some());
-    let layer_count =
-        if options.exact && full { a.layer_count + b.layer_count } else { a.layer_count.max(b.layer_count) };
-    if layer_count > LAYER_LIMIT {
-        let (of_a, of_b) = (a.layer_count, b.layer_count);
-        return Err(ToolError::Usage(format!(
-            "an exact blend has the layers of both, {of_a} and {of_b}; a file has room for {LAYER_LIMIT}: trim them first"
-        )));
-    }
-    let mut report = Report::default();
-    let mut channels: [ChannelModel; 3] = Default::default();
-    for (channel, (of_a, of_b)) in channels.iter_mut().zip(a.channels.iter().zip(&b.channels)) {
-        if let (Some(of_a), Some(of_b)) = (&of_a.mean, &of_b.mean) {
-            channel.mean = Some(blend_tables(of_a, of_b, alpha, quantise_means)?);
-        }
-        if let (Some(of_a), Some(of_b)) = (&of_a.scale, &of_b.scale) {
-            // Q15 in units of 2^shift.
-            channel.scale = Some(blend_tables(of_a, of_b, alpha, |q15| {
-                quantise_scales(&q15.iter().map(|q| q / 32_768.0).collect::<Vec<_>>())
-            })?);
-        }
-        if let (Some(of_a), Some(of_b)) = (&of_a.ensemble, &of_b.ensemble) {
-            let ensemble = if options.exact {
+) -> Result<(EnsembleTexture, BlendReport)> {
+    let mut report = BlendReport::default();
+    let mut texture = EnsembleTexture::default();
+    for (channel, pair) in texture.channels.iter_mut().zip(a.channels.iter().zip(&b.channels)) {
+        if let (Some(of_a), Some(of_b)) = pair {
+            *channel = Some(if options.exact {
                 side_by_side(of_a, of_b, alpha)?
             } else {
                 blend_ensembles(of_a, of_b, alpha, options, &mut report)?
-            };
-            channel.ensemble = Some(ensemble);
+            });
         }
     }
-    let model = MaterialModel {
-        layer_count,
-        channels,
-        metadata: blend_metadata(&a.metadata, &b.metadata),
-        extras: a.extras.iter().filter(|extra| b.extras.contains(extra)).cloned().collect(),
-        ..a.clone()
-    };
-    Ok((model, report))
-}
-
-/// Refuses two materials that have no common space.
-fn agree(a: &MaterialModel, b: &MaterialModel, options: Blend) -> Result<()> {
-    let kind = |model: &MaterialModel| matches!(model.transfer, TransferModel::Linear { .. });
-    let states = |model: &MaterialModel| [0, 1, 2].map(|c| model.state(c));
-    let scales = |model: &MaterialModel| model.channels.each_ref().map(|channel| channel.scale.is_some());
-    let same_scales = a.channels.iter().zip(&b.channels).all(|(a, b)| a.scale == b.scale);
-    let rules = [
-        (a.tensor.is_none() && b.tensor.is_none(), "methods: both must be sparse ensembles"),
-        (a.size == b.size, "image sizes: both must have the same width and height"),
-        (a.edge == b.edge, "block edges: encode both with the same"),
-        (a.level_count == b.level_count, "numbers of levels: trim the one that has more"),
-        (a.lights == b.lights, "light directions: both must have the same, in the same order"),
-        (a.views() == b.views(), "view directions: both must have the same, in the same order"),
-        (states(a) == states(b), "channel states: trim a texture or a channel that only one has"),
-        (kind(a) == kind(b), "transfers: both must be log2 or linear"),
-        (a.transfer == b.transfer, "log offsets or exponents: encode both with the same"),
-        (
-            a.cosine_included == b.cosine_included,
-            "cosine flags: both must have the light's cosine in, or both not",
-        ),
-        (a.matrix_q13 == b.matrix_q13, "colour matrices: encode both with the same channels"),
-        (scales(a) == scales(b), "scales: only one of them has a table; encode both with or without"),
-        (
-            same_scales || options.scales_apart,
-            "scales: values do not blend linearly; blend textures and scales apart, or encode both without scales",
-        ),
-    ];
-    match rules.iter().find(|(holds, _)| !holds) {
-        Some((_, what)) => Err(ToolError::Usage(format!("the two materials differ in their {what}"))),
-        None => Ok(()),
-    }
-}
-
-fn blend_tables(
-    a: &PairTableModel,
-    b: &PairTableModel,
-    alpha: f64,
-    quantise: impl Fn(&[f64]) -> Result<PairTableModel>,
-) -> Result<PairTableModel> {
-    if a == b {
-        return Ok(a.clone());
-    }
-    let value = |table: &PairTableModel, entry: i16| {
-        entry as f64 * 2f64.powi(table.shift as i32) + table.base_q20 as f64
-    };
-    let blended: Vec<f64> = a
-        .entries
-        .iter()
-        .zip(&b.entries)
-        .map(|(&p, &q)| (1.0 - alpha) * value(a, p) + alpha * value(b, q))
-        .collect();
-    quantise(&blended)
-}
-
-/// Texts of both where they differ; numbers where they agree.
-fn blend_metadata(a: &MetadataModel, b: &MetadataModel) -> MetadataModel {
-    let either = |a: u32, b: u32| if a == b { a } else { 0 };
-    MetadataModel {
-        texel_nm: std::array::from_fn(|i| either(a.texel_nm[i], b.texel_nm[i])),
-        frame: either(a.frame, b.frame),
-        image_origin: either(a.image_origin, b.image_origin),
-        primaries: either(a.primaries, b.primaries),
-        texts: std::array::from_fn(|i| {
-            if a.texts[i] == b.texts[i] {
-                a.texts[i].clone()
-            } else {
-                format!("{}; {}", a.texts[i], b.texts[i])
-            }
-        }),
-    }
+    Ok((texture, report))
 }
 
 /// What a record stands for, times a weight: a coefficient is worth `2^-(shift + 5)` of the channel's unit.
@@ -234,7 +93,7 @@ fn blend_ensembles(
     b: &EnsembleModel,
     alpha: f64,
     options: Blend,
-    report: &mut Report,
+    report: &mut BlendReport,
 ) -> Result<EnsembleModel> {
     // Dictionaries of both, those of b that a has as well but once.
     let mut dictionaries: Vec<&DictionaryModel> = a.dictionaries.iter().collect();
@@ -249,44 +108,26 @@ fn blend_ensembles(
         })
         .collect();
     let bases: Vec<Basis> = dictionaries.par_iter().map(|dictionary| Basis::new(dictionary)).collect();
-    let pairs: Vec<Vec<Vec<Pair>>> = (0..a.coefficients.len())
-        .map(|level| {
-            let blocks = a.coefficients[level]
-                .iter()
-                .chain(&b.coefficients[level])
-                .map(|layer| layer.records.len())
-                .max()
-                .unwrap_or(0);
-            let layers = a.coefficients[level].len().max(b.coefficients[level].len());
-            let of_layer = |layer: usize| {
-                let of_a = float_layer(a, level, layer, 1.0 - alpha, blocks);
-                let of_b = float_layer(b, level, layer, alpha, blocks);
-                of_a.into_par_iter()
-                    .zip(of_b)
-                    .map(|(of_a, of_b)| pair_of(&bases, of_a, (number_of_b[of_b.0], of_b.1)))
-                    .collect()
-            };
-            (0..layers).map(of_layer).collect()
-        })
-        .collect();
-    let mut changes: Vec<(usize, usize)> = pairs
-        .iter()
-        .flatten()
-        .flatten()
-        .filter(|pair| needs_change(pair))
-        .map(|pair| (pair.target.0, pair.other.0))
-        .collect();
-    changes.sort_unstable();
-    changes.dedup();
-    let changes: BTreeMap<(usize, usize), Change> = changes
-        .into_par_iter()
-        .map(|(target, other)| ((target, other), Change::new(&bases[target], &bases[other])))
-        .collect();
+    let pairs_of_level = |level: usize| -> Vec<Vec<Pair>> {
+        let (of_a, of_b) = (&a.coefficients[level], &b.coefficients[level]);
+        let blocks = of_a.iter().chain(of_b).map(|layer| layer.records.len()).max().unwrap_or(0);
+        let of_layer = |layer: usize| {
+            let of_a = float_layer(a, level, layer, 1.0 - alpha, blocks);
+            let of_b = float_layer(b, level, layer, alpha, blocks);
+            of_a.into_par_iter()
+                .zip(of_b)
+                .map(|(of_a, of_b)| pair_of(&bases, of_a, (number_of_b[of_b.0], of_b.1)))
+                .collect()
+        };
+        (0..of_a.len().max(of_b.len())).map(of_layer).collect()
+    };
+    let pairs: Vec<Vec<Vec<Pair>>> = (0..a.coefficients.len()).map(pairs_of_level).collect();
+    let changes = changes_of(&bases, pairs.iter().flatten().flatten());
     let mut records = Vec::with_capacity(pairs.len());
     for level in pairs {
         let mut of_level = Vec::with_capacity(level.len());
         for layer in level {
-            let blended: Vec<(FloatRecord, Report)> =
+            let blended: Vec<(FloatRecord, BlendReport)> =
                 layer.into_par_iter().map(|pair| blend_pair(&bases, &changes, pair, options)).collect();
             for (_, part) in &blended {
                 report.summed += part.summed;
@@ -312,6 +153,19 @@ fn blend_ensembles(
     let (atoms, coefficients) = quantise(&records, dictionaries.len(), &bits)?;
     let dictionaries = dictionaries.into_iter().cloned().collect();
     within_limit(EnsembleModel { dictionaries, atoms, coefficients })
+}
+
+/// The changes of basis that pairs take.
+fn changes_of<'a>(
+    bases: &[Basis],
+    pairs: impl Iterator<Item = &'a Pair>,
+) -> BTreeMap<(usize, usize), Change> {
+    let mut changes: Vec<(usize, usize)> =
+        pairs.filter(|pair| needs_change(pair)).map(|pair| (pair.target.0, pair.other.0)).collect();
+    changes.sort_unstable();
+    changes.dedup();
+    let change = |(target, other): (usize, usize)| Change::new(&bases[target], &bases[other]);
+    changes.into_par_iter().map(|key| (key, change(key))).collect()
 }
 
 /// Drops what nothing uses and refuses more dictionaries than a file has room for.
@@ -345,7 +199,7 @@ fn blend_pair(
     changes: &BTreeMap<(usize, usize), Change>,
     pair: Pair,
     options: Blend,
-) -> (FloatRecord, Report) {
+) -> (FloatRecord, BlendReport) {
     let Pair { target: (k, own), other: (p, other) } = pair;
     let basis = &bases[k];
     let most = options.most.map_or(own.len() + other.len(), |most| most as usize).min(COUNT_LIMIT);
@@ -353,7 +207,7 @@ fn blend_pair(
         let whole = basis.sum(&own, &other, usize::MAX);
         let kept = basis.sum(&whole, &Sparse::new(), most);
         let lost = if kept.len() < whole.len() { basis.energy(&difference(&whole, &kept)) } else { 0.0 };
-        let report = Report { summed: 1, energy: basis.energy(&whole), lost, ..Report::default() };
+        let report = BlendReport { summed: 1, energy: basis.energy(&whole), lost, ..BlendReport::default() };
         return ((k, kept), report);
     }
     let change = &changes[&(k, p)];
@@ -364,7 +218,7 @@ fn blend_pair(
     let lost = (basis.energy(&rest) + 2.0 * change.product(&rest, &other) + other_energy).max(0.0);
     let energy = (basis.energy(&own) + 2.0 * change.product(&own, &other) + other_energy).max(0.0);
     let outside = (other_energy - change.energy_inside(&other)).max(0.0);
-    ((k, sum), Report { changed: 1, energy, outside, lost, ..Report::default() })
+    ((k, sum), BlendReport { changed: 1, energy, outside, lost, ..BlendReport::default() })
 }
 
 /// One record less another of the same dictionary.
@@ -438,7 +292,7 @@ fn weigh(ensemble: &EnsembleModel, weight: f64) -> Result<EnsembleModel> {
             return Ok(weighted);
         }
     }
-    // Rounding takes a record that is full to the brim over it: values are quantised anew.
+    // Rounding takes a record that is full to the brim over it: values are quantised again.
     let of_layer = |layer: &CoefficientsModel| {
         layer.records.iter().map(|record| float_record(ensemble, record, layer.value_bits, weight)).collect()
     };
@@ -456,11 +310,11 @@ fn weigh(ensemble: &EnsembleModel, weight: f64) -> Result<EnsembleModel> {
 /// The atom whose coefficients are a weight of at most one times the atom's, as fine as they fit.
 fn weighted_atom(atom: AtomModel, weight: f64) -> AtomModel {
     let (base, end) = (atom.base as f64 * weight, (atom.base as f64 + atom.step as f64) * weight);
-    let fits = |shift: u32| base.abs().max(end.abs()) * 2f64.powi((shift - atom.shift) as i32) < 32_766.0;
+    let fits = |shift: u32| base.abs().max(end.abs()) * 2f64.powi((shift - atom.shift) as i32) < LARGEST;
     let shift = (atom.shift..=15).rev().find(|&shift| fits(shift)).unwrap_or(atom.shift);
     let gain = 2f64.powi((shift - atom.shift) as i32);
     let new_base = (base * gain).round() as i16;
-    let room = (32_767 - new_base as i32).min(65_535) as f64;
+    let room = (i16::MAX as i32 - new_base as i32).min(u16::MAX as i32) as f64;
     AtomModel {
         shift,
         base: new_base,

@@ -46,6 +46,9 @@ impl Blocks<'_> {
     }
 
     /// Reads a block: `out[channel]` receives `[y][x][view][light]`, less the means.
+    ///
+    /// # Errors
+    /// If the dataset cannot be read.
     pub fn read(&self, block: usize, scratch: &mut Scratch, out: &mut [Vec<f32>; 3]) -> Result<()> {
         let description = self.dataset.description();
         let ([width, height], pairs, edge) = (description.size, description.pairs(), self.edge);
@@ -97,6 +100,9 @@ pub struct Moments {
 type Sums = ([Vec<f64>; 3], [Vec<f32>; 3], [Vec<f32>; 3]);
 
 /// Means and second moments of a whole dataset in one pass.
+///
+/// # Errors
+/// If the dataset cannot be read.
 pub fn moments(dataset: &Dataset, forward: Forward, progress: &dyn Fn(usize, usize)) -> Result<Moments> {
     let description = dataset.description();
     let (lights, views, pairs) = (description.lights.len(), description.views.len(), description.pairs());

@@ -5,8 +5,8 @@
 //! both in its own way and keeps the others. So the costly product with all directions is made once a block
 //! (equation 3 in a subspace), and a dictionary adds small products only.
 
-use crate::format::model::DictionaryModel;
 use crate::math::linear::{Basis, multiply, product, product_at};
+use crate::methods::sparse_ensemble::model::DictionaryModel;
 use faer::{MatMut, MatRef};
 
 /// How one dictionary differs from the shared bases, and its bases over texels.

@@ -5,14 +5,14 @@
 //! section of an optional kind as JSON, which decoders skip.
 
 use crate::error::{Result, ToolError};
-use crate::format::model::{
-    ChannelModel, DictionaryModel, EnsembleModel, FactorModel, MaterialModel, MetadataModel, TransferModel,
-};
+use crate::format::container::take_apart;
+use crate::format::model::{MaterialModel, MetadataModel, TransferModel};
 use crate::format::triangulate::project;
-use crate::format::write::{take_apart, write_dictionary};
+use crate::format::write::write_dictionary;
 use crate::math::linear::{Basis, nearest_orthogonal, product_at};
 use crate::methods::sparse_ensemble::dictionary::{Ensemble, Turn};
 use crate::methods::sparse_ensemble::encode::columns::Used;
+use crate::methods::sparse_ensemble::model::{DictionaryModel, EnsembleModel, EnsembleTexture, FactorModel};
 use crate::methods::sparse_ensemble::train::{Options, Trained};
 use glam::DVec3;
 use selvedge::Limits;
@@ -79,16 +79,12 @@ pub fn to_bytes(trained: &Trained, training: &Training, metadata: MetadataModel)
             }
         };
         let dictionaries: Vec<DictionaryModel> = (0..ensemble.turns.len()).map(dictionary).collect();
-        ChannelModel {
-            mean: None,
-            scale: None,
-            ensemble: Some(EnsembleModel { dictionaries, ..EnsembleModel::default() }),
-        }
+        Some(EnsembleModel { dictionaries, ..EnsembleModel::default() })
     };
     let mut json = serde_json::to_vec(training).expect("plain data");
     json.resize(json.len().next_multiple_of(4), b' ');
     let project_all = |set: &[DVec3]| set.iter().map(|&d| project(d)).collect::<Vec<_>>();
-    let model = MaterialModel {
+    let model: MaterialModel = MaterialModel {
         size: [1, 1],
         level_count: 1,
         edge: training.options.edge as u32,
@@ -99,8 +95,8 @@ pub fn to_bytes(trained: &Trained, training: &Training, metadata: MetadataModel)
         metadata,
         lights: project_all(&training.lights),
         views: (training.views != training.lights).then(|| project_all(&training.views)),
-        channels: trained.ensembles.each_ref().map(channel),
-        tensor: None,
+        channels: Default::default(),
+        texture: Box::new(EnsembleTexture { channels: trained.ensembles.each_ref().map(channel) }),
         extras: vec![(TRAINING, 0, json)],
     };
     write_dictionary(&model)

@@ -7,10 +7,11 @@
 //! to lose less, since a fine shift for a quiet layer widens the range that a loud one has to share.
 
 use crate::error::{Result, ToolError};
-use crate::format::model::{AtomModel, CoefficientsModel, PairTableModel, RecordModel};
+use crate::format::units::LARGEST_ENTRY;
+use crate::methods::sparse_ensemble::layout::{VIEW_BIT, atom_columns};
+use crate::methods::sparse_ensemble::model::{AtomModel, CoefficientsModel, RecordModel};
 use selvedge::ensemble::dequantise;
 use selvedge::ensemble_set::{ATOM_LIMIT, SUM_LIMIT};
-use selvedge::pair_table::{BASE_BOUND, MEAN_SHIFT_LIMIT, SCALE_SHIFT_LIMIT};
 
 /// A record before quantisation: its dictionary, and atoms (columns only) with coefficients.
 ///
@@ -118,53 +119,12 @@ pub fn quantise(
     Ok((atoms, records.iter().map(|level| filled.by_ref().take(level.len()).collect()).collect()))
 }
 
-/// Means in Q20 over the smallest range of 16 bits that holds them (8.1).
-///
-/// # Errors
-/// [`ToolError::Usage`] if they are beyond the format.
-pub fn quantise_means(means_q20: &[f64]) -> Result<PairTableModel> {
-    let (low, high) =
-        means_q20.iter().fold((f64::MAX, f64::MIN), |(low, high), &q| (low.min(q), high.max(q)));
-    let base = ((low + high) / 2.0).round().clamp(-BASE_BOUND as f64, BASE_BOUND as f64);
-    let Some(shift) =
-        (0..=MEAN_SHIFT_LIMIT).find(|&s| (high - base).max(base - low) / 2f64.powi(s as i32) < 32_767.5)
-    else {
-        return Err(ToolError::Usage(format!(
-            "means from {:e} to {:e} are beyond the format",
-            low / 1_048_576.0,
-            high / 1_048_576.0
-        )));
-    };
-    let entries = means_q20
-        .iter()
-        .map(|q| ((q - base) / 2f64.powi(shift as i32)).round().clamp(-32_767.0, 32_767.0) as i16)
-        .collect();
-    Ok(PairTableModel { base_q20: base as i32, shift, entries })
-}
-
-/// Scales, 1 for a texture as it is, in the finest unit that holds them (8.2).
-///
-/// # Errors
-/// [`ToolError::Usage`] if they are beyond the format.
-pub fn quantise_scales(scales: &[f64]) -> Result<PairTableModel> {
-    let largest = scales.iter().fold(0.0f64, |largest, s| largest.max(s.abs()));
-    let Some(shift) = (0..=SCALE_SHIFT_LIMIT).find(|&s| largest / 2f64.powi(s as i32) < 0.999) else {
-        return Err(ToolError::Usage(format!("a scale of {largest:e} is beyond the format")));
-    };
-    let unit = 32_768.0 / 2f64.powi(shift as i32);
-    Ok(PairTableModel {
-        base_q20: 0,
-        shift,
-        entries: scales.iter().map(|s| (s * unit).round().clamp(-32_767.0, 32_767.0) as i16).collect(),
-    })
-}
-
 /// The words without shift of all atoms that occur, ascending, for each dictionary.
 fn atom_keys(records: &[Vec<Vec<FloatRecord>>], dictionaries: usize) -> Result<Vec<Vec<u32>>> {
     let mut keys: Vec<Vec<u32>> = vec![Vec::new(); dictionaries];
     for (number, list) in records.iter().flatten().flatten() {
         match keys.get_mut(*number) {
-            Some(keys) => keys.extend(list.iter().map(|(atom, _)| atom.word() >> 4)),
+            Some(keys) => keys.extend(list.iter().map(|(atom, _)| atom.word() >> VIEW_BIT)),
             None if list.is_empty() => {}
             None => {
                 return Err(ToolError::Usage(format!(
@@ -199,7 +159,7 @@ impl<'a> Group<'a> {
             let first = atoms.len();
             let mut sum = 0.0;
             for (atom, value) in list {
-                let place = keys[*number].partition_point(|&key| key < atom.word() >> 4);
+                let place = keys[*number].partition_point(|&key| key < atom.word() >> VIEW_BIT);
                 atoms.push((starts[*number] + place) as u32);
                 largest = largest.max(value.abs());
                 sum += value.abs();
@@ -244,13 +204,8 @@ impl<'a> Group<'a> {
 
 /// The atom whose word without shift is `key`.
 fn atom_of(key: u32) -> AtomModel {
-    AtomModel {
-        y: key >> 24,
-        x: key >> 20 & 0xf,
-        light: key >> 10 & 0x3ff,
-        view: key & 0x3ff,
-        ..AtomModel::default()
-    }
+    let [light, view, x, y] = atom_columns(key << VIEW_BIT);
+    AtomModel { light, view, x, y, ..AtomModel::default() }
 }
 
 /// Atoms whose ranges hold all values at these shifts, or the group whose shift is too fine.
@@ -296,7 +251,7 @@ fn fit(
             let largest = low[atom].abs().max(high[atom].abs());
             let fits = |fine: u32| {
                 let (base, step) = quantiser(atom, fine);
-                largest * 2f64.powi(fine as i32) < LARGEST && step <= 65_535.0 && base + step <= 32_767.0
+                largest * 2f64.powi(fine as i32) < LARGEST && step <= 65_535.0 && base + step <= LARGEST_ENTRY
             };
             let fine = (0..=15u32).rev().find(|&fine| fits(fine)).ok_or(widest[atom] as usize)?;
             let (base, step) = quantiser(atom, fine);

@@ -1,4 +1,4 @@
-//! Import of the files of SparseBTF (Kavoosighafi et al. 2023), without encoding anew.
+//! Import of the files of SparseBTF (Kavoosighafi et al. 2023), without encoding again.
 //!
 //! The authors' coefficients and dictionaries become a legal file: each column is scaled to its largest
 //! entry and the scale folded into the coefficients, columns and dictionaries that no block uses are left
@@ -6,12 +6,14 @@
 //! whose partners have theirs becomes a mean alone, from the shared mean of all three (their average).
 
 use crate::error::{Result, ToolError};
-use crate::format::model::{
-    AtomModel, ChannelModel, DictionaryModel, EnsembleModel, FactorModel, MaterialModel, MetadataModel,
-    PairTableModel, TransferModel,
-};
+use crate::format::model::{ChannelModel, MaterialModel, MetadataModel, PairTableModel, TransferModel};
+use crate::format::tables::{quantise_means, quantise_scales};
 use crate::format::triangulate::project;
-use crate::methods::sparse_ensemble::quantise::{FloatRecord, quantise, quantise_means, quantise_scales};
+use crate::format::units::{LARGEST_ENTRY, ONE_Q13, ONE_Q15, ONE_Q20};
+use crate::methods::sparse_ensemble::model::{
+    AtomModel, DictionaryModel, EnsembleModel, EnsembleTexture, FactorModel,
+};
+use crate::methods::sparse_ensemble::quantise::{FloatRecord, quantise};
 use std::collections::BTreeMap;
 use std::f64::consts::LN_2;
 use std::path::{Path, PathBuf};
@@ -93,6 +95,9 @@ impl Foreign {
 }
 
 /// Names of the materials whose coefficients are in a folder.
+///
+/// # Errors
+/// If the folder cannot be read.
 pub fn materials_in(folder: &Path) -> Result<Vec<String>> {
     let mut names: Vec<String> = std::fs::read_dir(folder)
         .map_err(ToolError::io(folder))?
@@ -111,6 +116,9 @@ pub fn materials_in(folder: &Path) -> Result<Vec<String>> {
 }
 
 /// Reads a material's files; `blocks` along x and y, or a square if `None`.
+///
+/// # Errors
+/// If a file cannot be read, or is not what its layout says ([`ToolError::Foreign`], with the byte).
 pub fn read_material(folder: &Path, name: &str, blocks: Option<[usize; 2]>) -> Result<AuthorsMaterial> {
     let locations = Foreign::read(folder.join("xyz_loc.bin"))?;
     let xyz = locations.doubles();
@@ -349,22 +357,26 @@ impl AuthorsMaterial {
     }
 
     /// The model of a file, values quantised to `value_bits`.
+    ///
+    /// # Errors
+    /// [`ToolError::Usage`] if values are beyond the format.
     pub fn to_model(&self, value_bits: u32) -> Result<MaterialModel> {
         let missing = self.channels.iter().filter(|c| c.is_none()).count();
         let mut channels: [ChannelModel; 3] = Default::default();
+        let mut texture = EnsembleTexture::default();
         for (c, channel) in channels.iter_mut().enumerate() {
             match &self.channels[c] {
                 Some(authors) => {
                     channel.mean = Some(mean_table(&self.mean)?);
                     channel.scale = Some(scale_table(&self.deviation)?);
-                    channel.ensemble = Some(quantise_channel(authors, &self.rows, value_bits)?);
+                    texture.channels[c] = Some(quantise_channel(authors, &self.rows, value_bits)?);
                 }
                 // One unknown follows from the shared mean; two do not, and are left out.
                 None if missing == 1 => channel.mean = Some(mean_table(&self.channel_means(c))?),
                 None => {}
             }
         }
-        let matrix: Vec<i16> = YUV_TO_RGB.iter().flatten().map(|m| (m * 8192.0).round() as i16).collect();
+        let matrix: Vec<i16> = YUV_TO_RGB.iter().flatten().map(|m| (m * ONE_Q13).round() as i16).collect();
         Ok(MaterialModel {
             size: self.blocks.map(|b| (b * EDGE) as u32),
             level_count: 1,
@@ -387,7 +399,7 @@ impl AuthorsMaterial {
             lights: self.directions.iter().map(|&d| project(d)).collect(),
             views: None,
             channels,
-            tensor: None,
+            texture: Box::new(texture),
             extras: Vec::new(),
         })
     }
@@ -395,7 +407,7 @@ impl AuthorsMaterial {
 
 /// Means, natural logarithm to base two.
 fn mean_table(means: &[f64]) -> Result<PairTableModel> {
-    quantise_means(&means.iter().map(|m| m / LN_2 * 1_048_576.0).collect::<Vec<_>>())
+    quantise_means(&means.iter().map(|m| m / LN_2 * ONE_Q20).collect::<Vec<_>>())
 }
 
 /// Scales, natural logarithm to base two.
@@ -406,7 +418,7 @@ fn scale_table(scales: &[f64]) -> Result<PairTableModel> {
 /// A column scaled to its largest entry, and that entry.
 fn scaled_column(column: &[f64]) -> (Vec<i16>, f64) {
     let largest = column.iter().fold(0.0f64, |largest, u| largest.max(u.abs()));
-    let scale = if largest > 0.0 { 32_767.0 / largest } else { 0.0 };
+    let scale = if largest > 0.0 { LARGEST_ENTRY / largest } else { 0.0 };
     (column.iter().map(|u| (u * scale).round() as i16).collect(), largest)
 }
 
@@ -457,7 +469,7 @@ fn quantise_channel(authors: &AuthorsChannel, rows: &[usize; 4], value_bits: u32
         scales.push([x.1, y.1, light.1, view.1]);
     }
     // Coefficients in units of the channel.
-    let table_gain = (32_768.0f64 / 32_767.0).powi(4);
+    let table_gain = (ONE_Q15 / LARGEST_ENTRY).powi(4);
     let blocks: Vec<FloatRecord> = authors
         .membership
         .iter()

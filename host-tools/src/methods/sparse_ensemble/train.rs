@@ -60,7 +60,7 @@ impl Default for Options {
     }
 }
 
-/// What training tells while it runs.
+/// What training reports while it runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Step {
     /// Channel, 0 to 2.
@@ -69,7 +69,7 @@ pub struct Step {
     pub iteration: usize,
     /// Error energy over that of the blocks.
     pub objective: f64,
-    /// Dictionaries without a block that began anew.
+    /// Dictionaries without a block that were started again.
     pub revived: usize,
 }
 
@@ -152,95 +152,35 @@ pub fn train(
     state: Option<&Path>,
     tell: &mut dyn FnMut(Step) -> bool,
 ) -> Result<Option<Trained>> {
-    let Some(first) = datasets.first() else {
-        return Err(ToolError::Usage("training needs a dataset".into()));
-    };
-    let (lights, views) = (first.description().lights.len(), first.description().views.len());
-    for dataset in datasets {
-        let other = dataset.description();
-        if other.lights != first.description().lights || other.views != first.description().views {
-            return Err(ToolError::Usage(format!(
-                "{}: other directions than those of {}",
-                dataset.path().display(),
-                first.path().display()
-            )));
-        }
-    }
+    let [lights, views] = equal_directions(datasets)?;
     let identity = identity(datasets, options);
     let mut now = match state.filter(|path| path.exists()) {
-        Some(path) => {
-            let found: State = serde_json::from_slice(&crate::files::read(path)?).map_err(|error| {
-                ToolError::Foreign { path: path.to_owned(), offset: 0, what: error.to_string() }
-            })?;
-            if found.identity != identity {
-                return Err(ToolError::Usage(format!(
-                    "{}: is of another training; remove it to begin anew",
-                    path.display()
-                )));
-            }
-            found
-        }
+        Some(path) => resume(path, identity)?,
         None => State { identity, ..State::default() },
     };
     let mut prepared = Vec::new();
     for dataset in datasets {
-        prepared.push(prepare(
-            vec![dataset],
-            TransferModel::Log2 { offset: dataset.statistics().coded_offset() },
-            &|_, _| (),
-        )?);
+        let transfer = TransferModel::Log2 { offset: dataset.statistics().coded_offset() };
+        prepared.push(prepare(vec![dataset], transfer, &|_, _| ())?);
     }
     let chosen = choose_blocks(&prepared, options);
     let subspaces = [lights, views].map(|n| options.subspace.clamp(1, n));
     while now.channel < 3 {
-        let c = now.channel;
-        let full = shared_bases(&prepared, c, [lights, views]);
+        let full = shared_bases(&prepared, now.channel, [lights, views]);
         let shared = Ensemble {
             light: full[0].first(subspaces[0]),
             view: full[1].first(subspaces[1]),
             ..Ensemble::default()
         };
-        let set = Set::read(&prepared, &chosen, c, shared, options)?;
-        if now.iteration == 0 {
-            let (ensemble, assigned) = set.begin(options);
-            now.turns[c] = turns_to_bits(&ensemble);
-            now.assigned = assigned;
-        }
-        let mut ensemble = Ensemble { turns: turns_from_bits(&now.turns[c]), ..set.shared.clone() };
-        loop {
-            let (kept, assigned, error, errors) = set.assign(&ensemble, &now.assigned, options.sparsity[c]);
-            now.assigned = assigned;
-            let objective = if set.energy > 0.0 { error / set.energy } else { 0.0 };
-            let before = now.objectives[c].last().copied();
-            now.objectives[c].push(objective);
-            now.members[c] = (0..ensemble.turns.len())
-                .map(|k| now.assigned.iter().filter(|&&a| a as usize == k).count())
-                .collect();
-            let settled = before.is_some_and(|before| before - objective < options.tolerance * before)
-                || objective <= 0.0;
-            let last = settled || now.iteration + 1 >= options.iterations;
-            let mut revived = 0;
-            if !last {
-                set.fit(&mut ensemble, &kept, &now.assigned);
-                revived = set.revive(&mut ensemble, &now.members[c], &errors);
-            }
-            let iteration = now.iteration;
-            now.iteration += 1;
-            now.turns[c] = turns_to_bits(&ensemble);
-            if last {
-                now.channel += 1;
-                now.iteration = 0;
-                now.assigned.clear();
-            }
+        let set = Set::read(&prepared, &chosen, now.channel, shared, options)?;
+        let mut each = |now: &State, step: Step| -> Result<bool> {
             if let Some(path) = state {
-                crate::files::write(path, &serde_json::to_vec(&now).expect("plain data"))?;
+                crate::files::write(path, &serde_json::to_vec(now).expect("plain data"))?;
             }
-            if !tell(Step { channel: c, iteration, objective, revived }) {
-                return Ok(None);
-            }
-            if last {
-                break;
-            }
+            Ok(tell(step))
+        };
+        if !train_channel(&set, options, &mut now, &mut each)? {
+            return Ok(None);
         }
     }
     let ensembles = std::array::from_fn(|c| {
@@ -251,6 +191,88 @@ pub fn train(
         std::fs::remove_file(path).map_err(ToolError::io(path))?;
     }
     Ok(Some(Trained { ensembles, objectives: now.objectives, members: now.members }))
+}
+
+/// The numbers of light and view directions of datasets that have the same.
+fn equal_directions(datasets: &[&Dataset]) -> Result<[usize; 2]> {
+    let Some(first) = datasets.first() else {
+        return Err(ToolError::Usage("training needs a dataset".into()));
+    };
+    for dataset in datasets {
+        let other = dataset.description();
+        if other.lights != first.description().lights || other.views != first.description().views {
+            return Err(ToolError::Usage(format!(
+                "{}: other directions than those of {}",
+                dataset.path().display(),
+                first.path().display()
+            )));
+        }
+    }
+    Ok([first.description().lights.len(), first.description().views.len()])
+}
+
+/// The state of this training in a file.
+fn resume(path: &Path, identity: String) -> Result<State> {
+    let bytes = crate::files::read(path)?;
+    let found: State = serde_json::from_slice(&bytes).map_err(|error| ToolError::Foreign {
+        path: path.to_owned(),
+        offset: 0,
+        what: error.to_string(),
+    })?;
+    if found.identity != identity {
+        return Err(ToolError::Usage(format!(
+            "{}: is of another training; remove it to start again",
+            path.display()
+        )));
+    }
+    Ok(found)
+}
+
+/// Trains the channel at which the state is to its end; `false` if `each` stops it.
+fn train_channel(
+    set: &Set,
+    options: &Options,
+    now: &mut State,
+    each: &mut dyn FnMut(&State, Step) -> Result<bool>,
+) -> Result<bool> {
+    let c = now.channel;
+    if now.iteration == 0 {
+        let (ensemble, assigned) = set.begin(options);
+        now.turns[c] = turns_to_bits(&ensemble);
+        now.assigned = assigned;
+    }
+    let mut ensemble = Ensemble { turns: turns_from_bits(&now.turns[c]), ..set.shared.clone() };
+    loop {
+        let (kept, assigned, error, errors) = set.assign(&ensemble, &now.assigned, options.sparsity[c]);
+        now.assigned = assigned;
+        let objective = if set.energy > 0.0 { error / set.energy } else { 0.0 };
+        let before = now.objectives[c].last().copied();
+        now.objectives[c].push(objective);
+        let members = |k: usize| now.assigned.iter().filter(|&&a| a as usize == k).count();
+        now.members[c] = (0..ensemble.turns.len()).map(members).collect();
+        let settled =
+            before.is_some_and(|before| before - objective < options.tolerance * before) || objective <= 0.0;
+        let last = settled || now.iteration + 1 >= options.iterations;
+        let mut revived = 0;
+        if !last {
+            set.fit(&mut ensemble, &kept, &now.assigned);
+            revived = set.revive(&mut ensemble, &now.members[c], &errors);
+        }
+        let iteration = now.iteration;
+        now.iteration += 1;
+        now.turns[c] = turns_to_bits(&ensemble);
+        if last {
+            now.channel += 1;
+            now.iteration = 0;
+            now.assigned.clear();
+        }
+        if !each(now, Step { channel: c, iteration, objective, revived })? {
+            return Ok(false);
+        }
+        if last {
+            return Ok(true);
+        }
+    }
 }
 
 /// What makes two trainings the same.
@@ -538,7 +560,7 @@ impl Set {
         }
     }
 
-    /// Dictionaries without a block begin anew, from the blocks with the largest errors.
+    /// Dictionaries without a block start again, from the blocks with the largest errors.
     fn revive(&self, ensemble: &mut Ensemble, members: &[usize], errors: &[f64]) -> usize {
         let mut order: Vec<usize> = (0..errors.len()).collect();
         order.sort_by(|&a, &b| errors[b].total_cmp(&errors[a]).then(a.cmp(&b)));

@@ -7,13 +7,15 @@ use super::prepare::Prepared;
 use super::records::{Layering, Places, float_records, rounding, used_columns};
 use super::select::Selection;
 use crate::data::dataset::Description;
-use crate::encode::means::described;
 use crate::error::{Result, ToolError};
-use crate::format::model::{
-    ChannelModel, CoefficientsModel, DictionaryModel, EnsembleModel, MaterialModel, RecordModel,
-};
+use crate::format::model::MaterialModel;
+use crate::format::texture::Texture;
 use crate::format::triangulate::{project, triangulate};
+use crate::methods::means::described;
 use crate::methods::sparse_ensemble::dictionary::Ensemble;
+use crate::methods::sparse_ensemble::model::{
+    CoefficientsModel, DictionaryModel, EnsembleModel, EnsembleTexture, RecordModel,
+};
 use crate::methods::sparse_ensemble::quantise::{Quantised, quantise};
 use selvedge::cost::{Shape, filtered_operations};
 
@@ -56,10 +58,9 @@ pub fn material(
     selections: &[Selection; 3],
 ) -> Result<(MaterialModel, f64)> {
     let description = setting.prepared.levels[0].description();
-    let mut channels: [ChannelModel; 3] = Default::default();
+    let mut texture = EnsembleTexture::default();
     let mut rounding = 0.0;
     for c in 0..3 {
-        channels[c].mean = Some(setting.prepared.means[c].clone());
         if selections[c].count > 0 {
             let of_channel: Vec<&Candidates> = candidates.iter().map(|level| &level[c]).collect();
             let (ensemble, lost) = channel(
@@ -69,15 +70,14 @@ pub fn material(
                 &selections[c],
                 setting.options.value_bits.map(|bits| bits[c]),
             )?;
-            channels[c].ensemble = Some(ensemble);
+            texture.channels[c] = Some(ensemble);
             rounding += lost;
         }
     }
     // Records that overflow may have given one channel more layers than another.
-    let layers = channels
-        .iter()
-        .flat_map(|c| c.ensemble.as_ref())
-        .map(|e| e.coefficients[0].len())
+    let layers = texture
+        .full()
+        .map(|(_, ensemble)| ensemble.coefficients[0].len())
         .max()
         .unwrap_or(setting.options.layers);
     if layers > LAYER_LIMIT {
@@ -88,7 +88,7 @@ pub fn material(
             ),
         });
     }
-    for ensemble in channels.iter_mut().flat_map(|c| c.ensemble.as_mut()) {
+    for ensemble in texture.channels.iter_mut().flatten() {
         for coefficients in &mut ensemble.coefficients {
             let empty = CoefficientsModel {
                 value_bits: 1,
@@ -97,17 +97,17 @@ pub fn material(
             coefficients.resize(layers, empty);
         }
     }
-    let model = MaterialModel {
-        level_count: setting.prepared.levels.len() as u32,
-        edge: setting.options.edge as u32,
-        layer_count: layers as u32,
-        channels,
-        ..described(description, setting.prepared.forward.transfer)
-    };
+    let texture: Box<dyn Texture> = Box::new(texture);
+    let mut model = described(description, setting.prepared.forward.transfer).with_texture(texture);
+    model.level_count = setting.prepared.levels.len() as u32;
+    model.edge = setting.options.edge as u32;
+    model.layer_count = layers as u32;
+    for (channel, mean) in model.channels.iter_mut().zip(&setting.prepared.means) {
+        channel.mean = Some(mean.clone());
+    }
     Ok((model, rounding))
 }
 
-/// The ensemble of a channel, and the energy that rounding of the values of level 0 loses.
 fn channel(
     setting: &Setting<'_>,
     ensemble: &Ensemble,

@@ -1,6 +1,6 @@
 //! Columns of bases that a file uses, as integers.
 
-use crate::format::model::FactorModel;
+use crate::methods::sparse_ensemble::model::FactorModel;
 use crate::math::linear::Basis;
 
 /// Columns of a basis that are used, each scaled to its largest entry.

@@ -2,7 +2,7 @@
 
 use crate::data::dataset::Dataset;
 use crate::data::transfer::Forward;
-use crate::encode::means::mean_tables;
+use crate::methods::means::mean_tables;
 use crate::error::Result;
 use crate::format::model::{PairTableModel, TransferModel};
 use crate::math::linear::{Basis, eigenbasis};

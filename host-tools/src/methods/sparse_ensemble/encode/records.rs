@@ -3,7 +3,7 @@
 use super::candidates::Candidates;
 use super::columns::{Tables, Used};
 use super::select::Selection;
-use crate::format::model::{AtomModel, CoefficientsModel};
+use crate::methods::sparse_ensemble::model::{AtomModel, CoefficientsModel};
 use crate::methods::sparse_ensemble::dictionary::Ensemble;
 use crate::methods::sparse_ensemble::quantise::FloatRecord;
 use selvedge::ensemble::dequantise;

@@ -8,6 +8,7 @@ use super::select::{Channel, Selection};
 use crate::error::{Result, ToolError};
 use crate::format::write::{write_material, write_with_dictionary};
 use crate::methods::sparse_ensemble::dictionary::Ensemble;
+use selvedge::directory::SPATIAL;
 use rayon::prelude::*;
 use selvedge::cost::record_operations;
 
@@ -224,7 +225,7 @@ fn finish(
             let same_edge = ensembles.iter().all(|e| {
                 e.tables.as_ref().is_some_and(|t| t[0].x.entries.len() == options.edge * options.edge)
             });
-            write_with_dictionary(&model, dictionary, !same_edge)
+            write_with_dictionary(&model, dictionary, if same_edge { &[] } else { &[SPATIAL] })
         }
         None => write_material(&model),
     };

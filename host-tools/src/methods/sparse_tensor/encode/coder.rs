@@ -8,11 +8,11 @@ use super::ranges::{Ranged, Ranges};
 use crate::data::dataset::Dataset;
 use crate::data::transfer::Forward;
 use crate::encode::goal::Target;
-use crate::encode::means::{described, mean_tables};
+use crate::methods::means::{described, mean_tables};
 use crate::error::{Result, ToolError};
-use crate::format::model::{
-    ChannelModel, ListsModel, MaterialModel, PairTableModel, TensorModel, TransferModel,
-};
+use crate::format::model::{MaterialModel, PairTableModel, TransferModel};
+use crate::format::texture::Texture;
+use crate::methods::sparse_tensor::model::{ListsModel, TensorModel};
 use crate::format::write::write_material;
 use crate::math::ksvd::{Pursuit, Rows};
 use crate::measure::baseline::pca::{Domain, Pca};
@@ -170,7 +170,7 @@ impl<'a> Coder<'a> {
         let per_level: Vec<Vec<Vec<(u32, u16)>>> =
             lists.iter_mut().map(|lists| std::mem::take(&mut lists.model)).collect();
         let (shifts, shift) = quantiser.shifts(&per_level);
-        let tensor = TensorModel {
+        let tensor: Box<dyn Texture> = Box::new(TensorModel {
             channels: [true; 3],
             light_atoms: ranged.atoms.light_atoms(),
             lights: ranged.atoms.lights(),
@@ -178,15 +178,12 @@ impl<'a> Coder<'a> {
             atoms: shifts,
             fibres: ranged.atoms.fibres(),
             lists: per_level.into_iter().map(|lists| vec![ListsModel { value_bits, shift, lists }]).collect(),
-        };
-        let channel =
-            |c: usize| ChannelModel { mean: Some(self.tables[c].clone()), ..ChannelModel::default() };
-        let model = MaterialModel {
-            level_count: self.levels.len() as u32,
-            channels: std::array::from_fn(channel),
-            tensor: Some(tensor),
-            ..described(self.data.description(), self.transfer)
-        };
+        });
+        let mut model = described(self.data.description(), self.transfer).with_texture(tensor);
+        model.level_count = self.levels.len() as u32;
+        for (channel, table) in model.channels.iter_mut().zip(&self.tables) {
+            channel.mean = Some(table.clone());
+        }
         let bytes = write_material(&model);
         Attempt { model, bytes, lists: lists.swap_remove(0) }
     }

@@ -4,8 +4,8 @@
 //! goes into the fibres; an ABRDF atom's coefficients fill 16 bits and their scale goes into its fibres too;
 //! what remains is a power of two, which the two shifts of the atom and that of the section take.
 
-use crate::format::model::AtomShifts;
 use crate::math::ksvd::Rows;
+use crate::methods::sparse_tensor::model::AtomShifts;
 use selvedge::tensor::{bit_length, list_coefficient};
 use selvedge::tensor_set::{FIBRE_SUM_LIMIT, LIST_SUM_LIMIT};
 

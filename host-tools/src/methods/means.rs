@@ -1,21 +1,18 @@
-//! What the model of a file takes from a dataset whatever its method: description, directions, means.
+//! What encoders of every method begin with: the description of a dataset as a model, and its means.
 
 use crate::data::dataset::Description;
 use crate::data::transfer::matrix_q13;
 use crate::error::Result;
 use crate::format::model::{MaterialModel, MetadataModel, PairTableModel, TransferModel};
+use crate::format::tables::quantise_means;
 use crate::format::triangulate::project;
-use crate::methods::sparse_ensemble::quantise::quantise_means;
+use crate::format::units::ONE_Q20;
 use glam::DVec3;
 
-/// One in Q20.
-const ONE_Q20: f64 = 1_048_576.0;
-
-/// Means of three channels, in units of the channel, over the smallest range of 16 bits that holds them
-/// (8.1), and as the decoder reads them.
+/// Means over the smallest range of 16 bits that holds them, and as the decoder reads them.
 ///
 /// # Errors
-/// [`ToolError::Usage`](crate::error::ToolError::Usage) if they are beyond the format.
+/// [`crate::error::ToolError::Usage`] if they are beyond the format.
 pub fn mean_tables(means: &[Vec<f64>; 3]) -> Result<([PairTableModel; 3], [Vec<f32>; 3])> {
     let mut tables: [PairTableModel; 3] = Default::default();
     let mut decoded: [Vec<f32>; 3] = Default::default();
@@ -27,8 +24,9 @@ pub fn mean_tables(means: &[Vec<f64>; 3]) -> Result<([PairTableModel; 3], [Vec<f
     Ok((tables, decoded))
 }
 
-/// The material that a dataset describes, without a channel yet: one level, one layer, blocks of one texel.
-pub fn described(description: &Description, transfer: TransferModel) -> MaterialModel {
+/// What a dataset says of its material, without tables and texture: one level, one layer, blocks of one
+/// texel.
+pub fn described(description: &Description, transfer: TransferModel) -> MaterialModel<()> {
     let points = |directions: &[DVec3]| directions.iter().map(|&d| project(d)).collect();
     MaterialModel {
         size: description.size.map(|n| n as u32),
@@ -48,7 +46,7 @@ pub fn described(description: &Description, transfer: TransferModel) -> Material
         lights: points(&description.lights),
         views: (description.lights != description.views).then(|| points(&description.views)),
         channels: Default::default(),
-        tensor: None,
+        texture: (),
         extras: Vec::new(),
     }
 }

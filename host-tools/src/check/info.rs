@@ -1,17 +1,11 @@
-//! What `info` tells: the same facts as text and as JSON.
+//! What `info` prints: the same facts as text and as JSON.
 
-use selvedge::Selvedge;
-use selvedge::directory::{
-    ANGULAR, ATOMS, COEFFICIENTS, DIRECTIONS, EXTERNAL, FIBRES, LIGHT_ATOMS, LISTS, MEANS, METADATA,
-    OPTIONAL, SCALES, SPATIAL,
-};
-use selvedge::header::METHOD_SPARSE_TENSOR;
+use crate::format::bits::hex;
+use crate::methods;
+use crate::methods::method::Method;
+use selvedge::directory::{DIRECTIONS, EXTERNAL, MEANS, METADATA, OPTIONAL, SCALES};
+use selvedge::{Finding, Selvedge};
 use serde::Serialize;
-
-/// Whether bytes are those of a dictionary file.
-pub fn is_dictionary(bytes: &[u8]) -> bool {
-    bytes.get(16..20) == Some(&selvedge::header::CONTENT_DICTIONARY.to_le_bytes())
-}
 
 /// A section, as JSON.
 #[derive(Clone, Debug, Serialize)]
@@ -37,7 +31,7 @@ pub struct Info {
     pub licence: String,
     /// Bytes of the file.
     pub bytes: u32,
-    /// `sparse ensemble` or `sparse tensor`.
+    /// Name of the method, such as `sparse-tensor`.
     pub method: &'static str,
     /// Texels.
     pub size: [u32; 2],
@@ -63,43 +57,36 @@ pub struct Info {
     pub sections: Vec<SectionReport>,
 }
 
-/// Bytes in hexadecimal.
-pub fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
-fn section_names(kind: u32, instance: u32) -> (String, String) {
+/// Name of a section's kind, and which of its kind it is.
+fn section_names(method: &Method, kind: u32, instance: u32) -> (String, String) {
     let channel = |name: &str| (name.to_owned(), format!("channel {instance}"));
+    if let Some(section) = method.sections.iter().find(|section| section.kind == kind) {
+        return (section.name.to_owned(), (section.instance)(instance));
+    }
     match kind {
         METADATA => ("metadata".into(), String::new()),
         EXTERNAL => ("external dictionary".into(), String::new()),
         DIRECTIONS => ("directions".into(), if instance == 0 { "light".into() } else { "view".into() }),
         MEANS => channel("means"),
         SCALES => channel("scales"),
-        ANGULAR => channel("angular factors"),
-        SPATIAL => channel("spatial factors"),
-        ATOMS => channel("atoms"),
-        COEFFICIENTS => (
-            "coefficients".into(),
-            format!("level {}, layer {}, channel {}", instance >> 8, instance >> 4 & 15, instance & 15),
-        ),
-        LIGHT_ATOMS => ("light atoms".into(), String::new()),
-        FIBRES => ("fibres".into(), String::new()),
-        LISTS => ("lists".into(), format!("level {}, layer {}", instance >> 8, instance >> 4 & 15)),
         _ if kind >= OPTIONAL => (format!("optional {kind:#06x}"), format!("{instance}")),
         _ => (format!("{kind:#06x}"), format!("{instance}")),
     }
 }
 
 /// What an open file is.
-pub fn info(material: &Selvedge<'_>) -> Info {
+///
+/// # Errors
+/// Rule 3.1-8 if the tools do not have the file's method.
+pub fn info(material: &Selvedge<'_>) -> Result<Info, Finding> {
+    let method = methods::of(material)?;
     let (header, metadata) = (material.header(), material.metadata());
-    Info {
+    Ok(Info {
         name: metadata.name.into(),
         origin: metadata.origin.into(),
         licence: metadata.licence.into(),
         bytes: header.file_length,
-        method: if header.method == METHOD_SPARSE_TENSOR { "sparse tensor" } else { "sparse ensemble" },
+        method: method.name,
         size: [header.width, header.height],
         levels: header.level_count,
         layers: header.layer_count,
@@ -115,38 +102,37 @@ pub fn info(material: &Selvedge<'_>) -> Info {
         sections: material
             .sections()
             .map(|section| {
-                let (kind, which) = section_names(section.kind, section.instance);
+                let (kind, which) = section_names(method, section.kind, section.instance);
                 SectionReport { kind, which, offset: section.offset, length: section.length }
             })
             .collect(),
-    }
+    })
 }
 
 /// The same for people.
 pub fn info_text(info: &Info) -> String {
-    let mut text = format!(
-        "{}\n  origin      {}\n  licence     {}\n  method      {}\n  size        {} x {} texels, {} levels, {} layers, blocks of {} x {}\n  directions  {} light, {} view\n  channels    {}, {}, {}; {}{}\n  bytes       {}\n  operations  {} a filtered sample at worst\n  digest      {}\n",
-        info.name,
-        info.origin,
-        info.licence,
-        info.method,
-        info.size[0],
-        info.size[1],
-        info.levels,
-        info.layers,
-        info.edge,
-        info.edge,
-        info.directions[0],
-        info.directions[1],
-        info.channels[0],
-        info.channels[1],
-        info.channels[2],
-        info.transfer,
-        if info.cosine_included { ", light's cosine included" } else { "" },
-        info.bytes,
-        info.operations,
-        info.decode_digest,
-    );
+    let [width, height] = info.size;
+    let Info { levels, layers, edge, .. } = info;
+    let [light, view] = info.directions;
+    let cosine = if info.cosine_included { ", light's cosine included" } else { "" };
+    let lines = [
+        ("origin", info.origin.clone()),
+        ("licence", info.licence.clone()),
+        ("method", info.method.to_owned()),
+        (
+            "size",
+            format!("{width} x {height} texels, {levels} levels, {layers} layers, blocks of {edge} x {edge}"),
+        ),
+        ("directions", format!("{light} light, {view} view")),
+        ("channels", format!("{}; {}{cosine}", info.channels.join(", "), info.transfer)),
+        ("bytes", info.bytes.to_string()),
+        ("operations", format!("{} a filtered sample at worst", info.operations)),
+        ("digest", info.decode_digest.clone()),
+    ];
+    let mut text = info.name.clone() + "\n";
+    for (name, value) in lines {
+        text += &format!("  {name:<12}{value}\n");
+    }
     for section in &info.sections {
         text +=
             &format!("  {:>9}  {:>9}  {} {}\n", section.offset, section.length, section.kind, section.which);
