@@ -3,9 +3,10 @@
 mod common;
 
 use common::{Numbers, broken_files, expected_print, fixture_bytes};
-use selvedge::interpolation::{radiance, texel_values, trilinear_values};
+use selvedge::kernel::interpolation::{radiance, texel_values};
+use selvedge::kernel::levels::trilinear_values;
 use selvedge::{
-    Direction, Family, FilteredQuery, Finding, Limits, Part, Rgb, Rule, Selvedge, Taps, Values, open,
+    Direction, Family, FilteredQuery, Finding, Limits, Located, Part, Rgb, Rule, Selvedge, Taps, Values, open,
 };
 use selvedge_c::*;
 use std::ffi::{CStr, c_char, c_void};
@@ -46,11 +47,13 @@ fn string(text: *const c_char) -> String {
     unsafe { CStr::from_ptr(text) }.to_str().expect("texts are ASCII").into()
 }
 
-/// Taps that no direction gives.
-fn wild_taps(numbers: &mut Numbers) -> Taps {
+/// A located direction that no direction gives.
+fn wild_located(numbers: &mut Numbers) -> Located {
     let [a, b, c] = [0; 3].map(|_| numbers.word());
     let [weight_a_q15, weight_b_q15, weight_c_q15, cosine_q15] = [0; 4].map(|_| numbers.word() as i32);
-    Taps { a, b, c, weight_a_q15, weight_b_q15, weight_c_q15, cosine_q15 }
+    let taps = Taps { a, b, c, weight_a_q15, weight_b_q15, weight_c_q15, cosine_q15 };
+    let [clamped_x_q18, clamped_y_q18, x_q18, y_q18, z_q15] = [0; 5].map(|_| numbers.word() as i32);
+    Located { direction: Direction { x_q18, y_q18, z_q15 }, clamped_x_q18, clamped_y_q18, taps }
 }
 
 /// Random queries of every function of single samples.
@@ -165,15 +168,15 @@ fn the_suite_is_sampled_as_by_the_core() {
     assert!(materials > 25 && outside >= 2, "{materials} {outside}");
 }
 
-/// Any taps and values are safe, though they mean nothing.
+/// Any located directions and values are safe, though they mean nothing.
 #[test]
-fn wild_taps_are_safe() {
+fn wild_directions_are_safe() {
     let bytes = fixture_bytes();
     let core = open(&bytes, &Limits::default()).expect("the fixture is good");
     let m = open_in_c(&bytes);
     let mut numbers = Numbers::new(2);
     for _ in 0..2000 {
-        let (lt, vt) = (wild_taps(&mut numbers), wild_taps(&mut numbers));
+        let (lt, vt) = (wild_located(&mut numbers), wild_located(&mut numbers));
         let [x, y, level] = [0; 3].map(|_| numbers.word());
         assert_eq!(
             told(|o| c!(selvedge_filtered_values(&m, x, y, &lt, &vt, o))),
@@ -637,7 +640,7 @@ fn mistakes_about_arguments_give_statuses() {
     for (bad, wanted) in
         [(null::<u8>(), SELVEDGE_NULL_POINTER), (askew((&raw const taps).cast()), SELVEDGE_MISALIGNED)]
     {
-        let (d, t): (*const Direction, *const Taps) = (bad.cast(), bad.cast());
+        let (d, t): (*const Direction, *const Located) = (bad.cast(), bad.cast());
         let statuses = [
             c!(selvedge_locate_light(&m, d, &mut located)),
             c!(selvedge_locate_view(&m, d, &mut located)),

@@ -81,7 +81,7 @@ fn containers() {
         any(true)
     };
     black_box(selvedge::validate(file, dictionary, &limits, &mut sink));
-    black_box(selvedge::open_telling(file, dictionary, &limits, &mut sink).is_some());
+    black_box(selvedge::open_reporting(file, dictionary, &limits, &mut sink).is_some());
     let mut first = First::default();
     black_box(first.report(any(Finding { rule: Rule::Magic, part: Part::File, offset: 0, found: 0 })));
     black_box(selvedge::validate(file, dictionary, &limits, &mut first));
@@ -238,7 +238,7 @@ fn kernel(files: words::Words<'_>) {
         selvedge::position_from_f32(any(0.0)),
     ));
 
-    black_box(selvedge::metadata::is_invisible(any('a')));
+    black_box(selvedge::container::metadata::is_invisible(any('a')));
 
     let (values, taps) = (any(Values::default()), any(Taps::default()));
     black_box((

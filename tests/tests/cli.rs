@@ -1,6 +1,6 @@
 //! The program as a user meets it: exit codes, silence, whole files.
 
-use selvedge_tests::{excerpt_folder, program};
+use selvedge_tests::{excerpt_file, excerpt_folder, program};
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -73,7 +73,7 @@ fn a_dictionary_of_its_own() {
 #[test]
 fn exit_codes_tell_the_families_apart() {
     let folder = tempfile::tempdir().expect("folder");
-    let good = excerpt_folder().join("../carpet07-excerpt.selv");
+    let good = excerpt_file();
     let bytes = std::fs::read(&good).expect("file");
     let write = |name: &str, bytes: &[u8]| {
         let path = folder.path().join(name);
@@ -117,7 +117,7 @@ fn no_output_is_left_half_written() {
     assert_eq!(
         code(&[
             "decode",
-            text(&excerpt_folder().join("../carpet07-excerpt.selv")),
+            text(&excerpt_file()),
             "-o",
             text(&folder.path().join("picture.gif"))
         ]),
