@@ -215,7 +215,7 @@ pub unsafe extern "C" fn selvedge_texel_values(
     let compute = |selvedge: &Selvedge<'_>| {
         // SAFETY: the caller's promise is that of `read`.
         let (light, view) = unsafe { read_both(light, view) }?;
-        Ok(texel_values(selvedge.words(), selvedge.material(), texel_x, texel_y, light, view))
+        Ok(texel_values(selvedge.words(), selvedge.material(), texel_x, texel_y, &light, &view))
     };
     // SAFETY: the caller's promise is that of `answer`.
     unsafe { answer(material, out, compute) }
@@ -238,8 +238,8 @@ pub unsafe extern "C" fn selvedge_sample_texel(
         // SAFETY: the caller's promise is that of `read`.
         let (light, view) = unsafe { read_both(light, view) }?;
         let (light, view) = (selvedge.locate_light(light), selvedge.locate_view(view));
-        let values = texel_values(selvedge.words(), selvedge.material(), texel_x, texel_y, light, view);
-        Ok(radiance(selvedge.material(), values, light))
+        let values = texel_values(selvedge.words(), selvedge.material(), texel_x, texel_y, &light, &view);
+        Ok(radiance(selvedge.material(), values, &light))
     };
     // SAFETY: the caller's promise is that of `answer`.
     unsafe { answer(material, out, compute) }
@@ -283,7 +283,7 @@ pub unsafe extern "C" fn selvedge_filtered_values(
     let compute = |selvedge: &Selvedge<'_>| {
         // SAFETY: the caller's promise is that of `read`.
         let (light, view) = unsafe { read_both(light, view) }?;
-        Ok(selvedge.filtered_values(u_q32, v_q32, light, view))
+        Ok(selvedge.filtered_values(u_q32, v_q32, &light, &view))
     };
     // SAFETY: the caller's promise is that of `answer`.
     unsafe { answer(material, out, compute) }
@@ -329,7 +329,7 @@ pub unsafe extern "C" fn selvedge_trilinear_values(
     let compute = |selvedge: &Selvedge<'_>| {
         // SAFETY: the caller's promise is that of `read`.
         let (light, view) = unsafe { read_both(light, view) }?;
-        Ok(trilinear_values(selvedge.words(), selvedge.material(), level_q16, u_q32, v_q32, light, view))
+        Ok(trilinear_values(selvedge.words(), selvedge.material(), level_q16, u_q32, v_q32, &light, &view))
     };
     // SAFETY: the caller's promise is that of `answer`.
     unsafe { answer(material, out, compute) }
@@ -351,7 +351,7 @@ pub unsafe extern "C" fn selvedge_radiance(
         let values = unsafe { read(values) }?;
         // SAFETY: the same.
         let light: Located = unsafe { read(light) }?;
-        Ok(radiance(selvedge.material(), values, light))
+        Ok(radiance(selvedge.material(), values, &light))
     };
     // SAFETY: the caller's promise is that of `answer`.
     unsafe { answer(material, out, compute) }

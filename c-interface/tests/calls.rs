@@ -83,22 +83,22 @@ fn hold_samples(m: &selvedge_material, core: &Selvedge<'_>, numbers: &mut Number
             numbers.word(),
             if wild { numbers.word() } else { numbers.below(core.header().level_count << 16) },
         );
-        let texel = texel_values(core.words(), core.material(), x, y, lt, vt);
+        let texel = texel_values(core.words(), core.material(), x, y, &lt, &vt);
         assert_eq!(told(|o| c!(selvedge_texel_values(m, x, y, &lt, &vt, o))), texel);
         assert_eq!(
             told(|o| c!(selvedge_sample_texel(m, x, y, &light, &view, o))),
-            radiance(core.material(), texel, lt)
+            radiance(core.material(), texel, &lt)
         );
-        assert_eq!(told(|o| c!(selvedge_radiance(m, &texel, &lt, o))), radiance(core.material(), texel, lt));
+        assert_eq!(told(|o| c!(selvedge_radiance(m, &texel, &lt, o))), radiance(core.material(), texel, &lt));
         assert_eq!(
             told(|o| c!(selvedge_filtered_values(m, p, q, &lt, &vt, o))),
-            core.filtered_values(p, q, lt, vt)
+            core.filtered_values(p, q, &lt, &vt)
         );
         assert_eq!(
             told(|o| c!(selvedge_sample_filtered(m, p, q, &light, &view, o))),
             core.filtered(p, q, light, view)
         );
-        let between = trilinear_values(core.words(), core.material(), level, p, q, lt, vt);
+        let between = trilinear_values(core.words(), core.material(), level, p, q, &lt, &vt);
         assert_eq!(told(|o| c!(selvedge_trilinear_values(m, level, p, q, &lt, &vt, o))), between);
         assert_eq!(
             told(|o| c!(selvedge_sample_trilinear(m, level, p, q, &light, &view, o))),
@@ -180,17 +180,17 @@ fn wild_directions_are_safe() {
         let [x, y, level] = [0; 3].map(|_| numbers.word());
         assert_eq!(
             told(|o| c!(selvedge_filtered_values(&m, x, y, &lt, &vt, o))),
-            core.filtered_values(x, y, lt, vt)
+            core.filtered_values(x, y, &lt, &vt)
         );
-        let texel = texel_values(core.words(), core.material(), x, y, lt, vt);
+        let texel = texel_values(core.words(), core.material(), x, y, &lt, &vt);
         assert_eq!(told(|o| c!(selvedge_texel_values(&m, x, y, &lt, &vt, o))), texel);
-        let between = trilinear_values(core.words(), core.material(), level, x, y, lt, vt);
+        let between = trilinear_values(core.words(), core.material(), level, x, y, &lt, &vt);
         assert_eq!(told(|o| c!(selvedge_trilinear_values(&m, level, x, y, &lt, &vt, o))), between);
         let [c0, c1, c2] = [0; 3].map(|_| numbers.word() as i32);
         let values = Values { c0, c1, c2 };
         assert_eq!(
             told(|o| c!(selvedge_radiance(&m, &values, &lt, o))),
-            radiance(core.material(), values, lt)
+            radiance(core.material(), values, &lt)
         );
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::kernel::colour::Rgb;
 use crate::kernel::direction::Direction;
-use crate::method::method_of;
+use crate::method;
 use crate::selvedge::{BufferTooSmall, Selvedge, position_from_f32};
 
 /// A filtered sample to be made.
@@ -35,7 +35,7 @@ impl FilteredQuery {
 impl Selvedge<'_> {
     /// Words of scratch that [`Selvedge::sample_batch`] needs for `count` queries.
     pub fn batch_scratch_len(&self, count: usize) -> usize {
-        method_of(self.material().method).map_or(0, |method| (method.fast.batch_scratch_len)(self, count))
+        method::fast::batch_scratch_len(self, count)
     }
 
     /// Radiance of many filtered samples: `out[i]` equals [`Selvedge::filtered`] of `queries[i]`, bit for
@@ -56,8 +56,6 @@ impl Selvedge<'_> {
             return Err(BufferTooSmall { needed: queries.len(), lent: out.len() });
         }
         let (needed, lent) = (self.batch_scratch_len(queries.len()), scratch.len());
-        // Nothing of another method can be opened (3.1-8).
-        let Some(method) = method_of(self.material().method) else { return Ok(()) };
-        (method.fast.batch)(self, queries, scratch, out).ok_or(BufferTooSmall { needed, lent })
+        method::fast::batch(self, queries, scratch, out).ok_or(BufferTooSmall { needed, lent })
     }
 }

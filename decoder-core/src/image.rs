@@ -7,7 +7,7 @@ use crate::kernel::colour::{Rgb, Values};
 use crate::kernel::direction::Direction;
 use crate::kernel::interpolation::radiance;
 use crate::kernel::material::{CHANNEL_FULL, channel_of, level_size};
-use crate::method::method_of;
+use crate::method;
 use crate::selvedge::{BufferTooSmall, Selvedge};
 
 impl Selvedge<'_> {
@@ -19,10 +19,10 @@ impl Selvedge<'_> {
 
     /// Words of scratch that [`Selvedge::decode_image`] and [`Selvedge::decode_channel`] need.
     pub fn image_scratch_len(&self) -> usize {
-        match method_of(self.material().method) {
-            Some(method) if self.material().full_count > 0 => (method.fast.image_scratch_len)(self),
-            _ => 0,
+        if self.material().full_count == 0 {
+            return 0;
         }
+        method::fast::image_scratch_len(self)
     }
 
     /// Channel values, Q20, of every texel of a level: `[height, width]`, row-major.
@@ -47,7 +47,7 @@ impl Selvedge<'_> {
         let channel = channel.min(2) as u32;
         let query = self.image_query(level, light, view);
         if channel_of(self.material(), channel).state == CHANNEL_FULL {
-            self.image_textures(&query, scratch, Textures::One(channel, out));
+            method::fast::image(self, &query, scratch, Textures::One(channel, out));
         }
         let finish = self.finish_of(&query, channel);
         for value in out {
@@ -73,12 +73,12 @@ impl Selvedge<'_> {
         let query = self.image_query(level, light, view);
         // The buffer holds the textures first, then what they become.
         if self.material().full_count > 0 {
-            self.image_textures(&query, scratch, Textures::All(out));
+            method::fast::image(self, &query, scratch, Textures::All(out));
         }
         let [f0, f1, f2] = [0, 1, 2].map(|channel| self.finish_of(&query, channel));
         for texel in out {
             let [c0, c1, c2] = [f0.value(texel.r as i32), f1.value(texel.g as i32), f2.value(texel.b as i32)];
-            *texel = radiance(self.material(), Values { c0, c1, c2 }, query.light);
+            *texel = radiance(self.material(), Values { c0, c1, c2 }, &query.light);
         }
         Ok(())
     }
@@ -87,13 +87,6 @@ impl Selvedge<'_> {
         let level = level.min(self.material().level_count.wrapping_sub(1));
         let (light, view) = (self.locate_light(light), self.locate_view(view));
         ImageQuery { level, size: self.image_size(level), light, view }
-    }
-
-    fn image_textures(&self, query: &ImageQuery, scratch: &mut [i32], textures: Textures<'_>) {
-        // Nothing of another method can be opened (3.1-8).
-        if let Some(method) = method_of(self.material().method) {
-            (method.fast.image)(self, query, scratch, textures);
-        }
     }
 
     fn finish_of(&self, query: &ImageQuery, channel: u32) -> Finish {

@@ -10,7 +10,7 @@ use crate::container::pair_table::check_pair_table;
 use crate::error::{Finding, First, Part, Rule, Sink};
 use crate::kernel::material::{CHANNEL_FULL, Channel, Material, TRANSFER_LOG2};
 use crate::kernel::words::{Words, word};
-use crate::method::method_of;
+use crate::method;
 use crate::selvedge::Selvedge;
 use crate::walk::check::Check;
 use crate::walk::cost::{Shape, filtered_operations};
@@ -87,7 +87,7 @@ fn walk_dictionary(check: &mut Check<'_, '_>, limits: &Limits) -> Option<Header>
     }
     let section = find_section(check, &header, METADATA, 0)?;
     check_metadata(check, section);
-    (method_of(header.method)?.check_dictionary)(check, &header)?;
+    method::check_dictionary(check, &header)?;
     check.clean.then_some(header)
 }
 
@@ -137,7 +137,7 @@ fn check_material<'a>(
         }
     }
     // A method that this build does not have was refused with the header.
-    let textures = (method_of(header.method)?.check)(check, &header, external.as_ref(), &mut material)?;
+    let textures = method::check_material(check, &header, external.as_ref(), &mut material)?;
     if !sound || check.stopped {
         return None;
     }
@@ -178,7 +178,7 @@ fn walk_external(
         && other.light_count == header.light_count
         && other.view_count == header.view_count
         && serves;
-    let fits = fits && (method_of(header.method)?.dictionary_fits)(check, header, &other);
+    let fits = fits && method::dictionary_fits(check, header, &other);
     check.ensure(fits, Rule::ExternalFit, section.offset, other.edge).then_some(Some(other))
 }
 

@@ -113,7 +113,7 @@ impl<'a> Selvedge<'a> {
     /// moved to the last.
     pub fn point(&self, texel_x: u32, texel_y: u32, light_index: u32, view_index: u32) -> Rgb {
         let values = self.point_values(texel_x, texel_y, light_index, view_index);
-        radiance(&self.material, values, light_sample(self.words, &self.material, light_index))
+        radiance(&self.material, values, &light_sample(self.words, &self.material, light_index))
     }
 
     /// Channel values, Q20, of one texel of level 0 for one pair of sample directions (8.5).
@@ -124,12 +124,12 @@ impl<'a> Selvedge<'a> {
     /// Radiance at any position and for any directions, at full resolution (8.4). `u` and `v` are u0.32
     /// fractions of the image.
     pub fn filtered(&self, u_q32: u32, v_q32: u32, light: Direction, view: Direction) -> Rgb {
-        let light = self.locate_light(light);
-        radiance(&self.material, self.filtered_values(u_q32, v_q32, light, self.locate_view(view)), light)
+        let (light, view) = (self.locate_light(light), self.locate_view(view));
+        radiance(&self.material, self.filtered_values(u_q32, v_q32, &light, &view), &light)
     }
 
     /// Channel values, Q20, at any position for located directions (8.4).
-    pub fn filtered_values(&self, u_q32: u32, v_q32: u32, light: Located, view: Located) -> Values {
+    pub fn filtered_values(&self, u_q32: u32, v_q32: u32, light: &Located, view: &Located) -> Values {
         filtered_values(self.words, &self.material, 0, u_q32, v_q32, light, view)
     }
 
@@ -144,11 +144,8 @@ impl<'a> Selvedge<'a> {
     ) -> Rgb {
         let light = self.locate_light(light);
         let view = self.locate_view(view);
-        radiance(
-            &self.material,
-            trilinear_values(self.words, &self.material, level_q16, u_q32, v_q32, light, view),
-            light,
-        )
+        let values = trilinear_values(self.words, &self.material, level_q16, u_q32, v_q32, &light, &view);
+        radiance(&self.material, values, &light)
     }
 }
 

@@ -94,11 +94,11 @@ fn fast_paths_agree(material: &Selvedge<'_>) {
                 material.material(),
                 x,
                 y,
-                light,
-                view,
+                &light,
+                &view,
             );
             assert_eq!(
-                (selvedge::kernel::interpolation::radiance(material.material(), values, light), values.c0),
+                (selvedge::kernel::interpolation::radiance(material.material(), values, &light), values.c0),
                 (image[i], channel[i])
             );
         }
@@ -204,19 +204,19 @@ fn place_does_not_matter(material: &Selvedge<'_>, file: &[u8], dictionary: &[u8]
             let (light, view) = (material.light_direction(light), material.view_direction(view));
             let (own_light, own_view) =
                 (locate_light(words, &placed, light), locate_view(words, &placed, view));
-            let values = filtered_values(words, &placed, placed.level_count - 1, u, v, own_light, own_view);
+            let values = filtered_values(words, &placed, placed.level_count - 1, u, v, &own_light, &own_view);
             let wanted = filtered_values(
                 material.words(),
                 material.material(),
                 placed.level_count - 1,
                 u,
                 v,
-                material.locate_light(light),
-                material.locate_view(view),
+                &material.locate_light(light),
+                &material.locate_view(view),
             );
             assert_eq!(
-                radiance(&placed, values, own_light),
-                radiance(material.material(), wanted, own_light)
+                radiance(&placed, values, &own_light),
+                radiance(material.material(), wanted, &own_light)
             );
         }
     }

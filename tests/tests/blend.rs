@@ -17,8 +17,7 @@ use selvedge_tools::methods::sparse_ensemble::quantise::{FloatRecord, quantise};
 use std::path::Path;
 
 fn excerpt() -> MaterialModel {
-    let file = std::fs::read(selvedge_tests::excerpt_file())
-        .expect("excerpt");
+    let file = std::fs::read(selvedge_tests::excerpt_file()).expect("excerpt");
     read_model(&file, None, &Limits::NONE).expect("legal")
 }
 

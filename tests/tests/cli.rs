@@ -114,15 +114,7 @@ fn no_output_is_left_half_written() {
     }
     assert_eq!(code(&["import", text(&broken), "--material", "carpet07", "-o", text(&old)]), 3);
     assert_eq!(std::fs::read(&old).expect("still there"), b"precious");
-    assert_eq!(
-        code(&[
-            "decode",
-            text(&excerpt_file()),
-            "-o",
-            text(&folder.path().join("picture.gif"))
-        ]),
-        1
-    );
+    assert_eq!(code(&["decode", text(&excerpt_file()), "-o", text(&folder.path().join("picture.gif"))]), 1);
     let names: Vec<_> =
         std::fs::read_dir(folder.path()).expect("folder").map(|e| e.expect("entry").file_name()).collect();
     assert_eq!(names.len(), 2, "{names:?}");

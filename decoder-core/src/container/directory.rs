@@ -3,8 +3,7 @@
 use crate::container::header::{CONTENT_DICTIONARY, ENTRY_LENGTH, HEADER_LENGTH, Header};
 use crate::error::{Part, Rule};
 use crate::kernel::material::{CHANNEL_FULL, CHANNEL_MEAN, CHANNEL_MISSING};
-use crate::kernel::method::METHODS;
-use crate::method::{Call, Per, layer_instance, method_of};
+use crate::method::{Call, METHODS, Per, layer_instance, method_of};
 use crate::walk::check::{Check, Section};
 use crate::walk::crc32::crc32;
 

@@ -96,9 +96,9 @@ pub fn channel_q20(
 pub fn place_values(
     words: Words<'_>,
     material: &Material,
-    place: Place,
-    light: Located,
-    view: Located,
+    place: &Place,
+    light: &Located,
+    view: &Located,
 ) -> Values {
     let mut values = Values { c0: 0, c1: 0, c2: 0 };
     // 8.3-3: the method gives the textures of all channels.
@@ -155,12 +155,12 @@ pub fn filtered_values(
     level: u32,
     u_q32: u32,
     v_q32: u32,
-    light: Located,
-    view: Located,
+    light: &Located,
+    view: &Located,
 ) -> Values {
     // 8.4-4: a level beyond the last is the last.
     let inside = level.min(material.level_count.wrapping_sub(1));
-    place_values(words, material, place_at_position(material, inside, u_q32, v_q32), light, view)
+    place_values(words, material, &place_at_position(material, inside, u_q32, v_q32), light, view)
 }
 
 /// Values of one texel of level 0 for one pair of sample directions (8.5).
@@ -175,7 +175,7 @@ pub fn point_values(
     // 8.5-1: an index beyond the end is clamped to the last.
     let light = light_sample(words, material, light_index);
     let view = view_sample(words, material, view_index);
-    texel_values(words, material, texel_x, texel_y, light, view)
+    texel_values(words, material, texel_x, texel_y, &light, &view)
 }
 
 /// Values of one texel of level 0 for located directions (8.5).
@@ -184,12 +184,12 @@ pub fn texel_values(
     material: &Material,
     texel_x: u32,
     texel_y: u32,
-    light: Located,
-    view: Located,
+    light: &Located,
+    view: &Located,
 ) -> Values {
     let inside_x = texel_x.min(material.width.wrapping_sub(1));
     let inside_y = texel_y.min(material.height.wrapping_sub(1));
-    place_values(words, material, place_at_texel(material, 0, inside_x, inside_y), light, view)
+    place_values(words, material, &place_at_texel(material, 0, inside_x, inside_y), light, view)
 }
 
 /// A light direction, located (5.6).
@@ -213,6 +213,6 @@ pub fn view_sample(words: Words<'_>, material: &Material, index: u32) -> Located
 }
 
 /// Linear radiance of values seen under a located light (7.1).
-pub fn radiance(material: &Material, values: Values, light: Located) -> Rgb {
+pub fn radiance(material: &Material, values: Values, light: &Located) -> Rgb {
     colour(material, values, light.taps.cosine_q15)
 }

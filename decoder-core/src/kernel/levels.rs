@@ -20,8 +20,8 @@ pub fn trilinear_values(
     level_q16: u32,
     u_q32: u32,
     v_q32: u32,
-    light: Located,
-    view: Located,
+    light: &Located,
+    view: &Located,
 ) -> Values {
     // 9.2-1: beyond the last level lies the last level.
     let clamped = level_q16.min(material.level_count.wrapping_sub(1) << 16);

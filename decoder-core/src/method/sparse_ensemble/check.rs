@@ -36,11 +36,6 @@ pub(crate) const METHOD: Method = Method {
         SectionRule { kind: ATOMS, per: Per::Channel, source: Source::Material },
         SectionRule { kind: COEFFICIENTS, per: Per::LayerChannel, source: Source::Material },
     ],
-    check: check_ensemble,
-    check_dictionary: check_ensemble_dictionary,
-    dictionary_fits: spatial_factors_fit,
-    #[cfg(feature = "batch")]
-    fast: super::batch::FAST,
 };
 
 /// Most dictionaries of an ensemble (10.1-2).
@@ -55,7 +50,7 @@ pub const SUM_LIMIT: u32 = 65_535;
 pub const LOW_BITS_LIMIT: u32 = 12;
 
 /// Walks chapter 10 of a dictionary.
-pub(crate) fn check_ensemble_dictionary(check: &mut Check<'_, '_>, header: &Header) -> Option<()> {
+pub(crate) fn check_dictionary(check: &mut Check<'_, '_>, header: &Header) -> Option<()> {
     for c in 0..3 {
         if let Some(section) = find_section(check, header, ANGULAR, c) {
             let angular =
@@ -75,7 +70,7 @@ pub(crate) fn check_ensemble_dictionary(check: &mut Check<'_, '_>, header: &Head
 }
 
 /// Spatial factors that the material does not have must be in the dictionary, and for its edge (3.5-5).
-fn spatial_factors_fit(check: &mut Check<'_, '_>, header: &Header, other: &Header) -> bool {
+pub(crate) fn dictionary_fits(check: &mut Check<'_, '_>, header: &Header, other: &Header) -> bool {
     let lacks = [0, 1, 2].map(|c| header.is_full(c) && find_section(check, header, SPATIAL, c).is_none());
     let there = check.in_dictionary(|inner| {
         (0u32..).zip(lacks).all(|(c, lacks)| !lacks || find_section(inner, other, SPATIAL, c).is_some())
@@ -85,7 +80,7 @@ fn spatial_factors_fit(check: &mut Check<'_, '_>, header: &Header, other: &Heade
 
 /// Walks chapter 10 of a material, but for its statement of cost; gives the largest operations of a level's
 /// textures.
-pub(crate) fn check_ensemble(
+pub(crate) fn check_material(
     check: &mut Check<'_, '_>,
     header: &Header,
     external: Option<&Header>,

@@ -6,14 +6,10 @@
 
 #![cfg(feature = "sparse-ensemble")]
 
-#[cfg(feature = "batch")]
-mod batch;
 pub mod check;
 pub mod cost;
 #[cfg(feature = "batch")]
-mod image;
-#[cfg(feature = "batch")]
-mod records;
+pub(crate) mod fast;
 
 use crate::kernel::colour::Values;
 use crate::kernel::direction::{Located, Taps};
@@ -323,7 +319,7 @@ pub fn texture_q20(
     words: Words<'_>,
     material: &Material,
     number: u32,
-    place: Place,
+    place: &Place,
     light: Taps,
     view: Taps,
 ) -> i32 {
@@ -344,12 +340,14 @@ pub fn texture_q20(
 }
 
 /// The textures of all channels, Q20; zero for a channel without texture (10.7).
+// Apart, so that a sample of another method does not pay for this one's stack.
+#[inline(never)]
 pub fn sparse_ensemble_textures_q20(
     words: Words<'_>,
     material: &Material,
-    place: Place,
-    light: Located,
-    view: Located,
+    place: &Place,
+    light: &Located,
+    view: &Located,
 ) -> Values {
     let mut values = Values { c0: 0, c1: 0, c2: 0 };
     // 10.7-6: a loop, so that a compiler for GPUs makes one copy of a channel.

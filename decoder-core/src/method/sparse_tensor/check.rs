@@ -33,11 +33,6 @@ pub(crate) const METHOD: Method = Method {
         SectionRule { kind: FIBRES, per: Per::File, source: Source::Dictionary },
         SectionRule { kind: LISTS, per: Per::Layer, source: Source::Material },
     ],
-    check: check_tensor,
-    check_dictionary: check_tensor_dictionary,
-    dictionary_fits: |_, _, _| true,
-    #[cfg(feature = "batch")]
-    fast: super::fast::FAST,
 };
 
 /// Most light atoms (12.1-2).
@@ -69,16 +64,21 @@ struct Atoms {
 }
 
 /// Walks chapter 12 of a dictionary.
-pub(crate) fn check_tensor_dictionary(check: &mut Check<'_, '_>, header: &Header) -> Option<()> {
+pub(crate) fn check_dictionary(check: &mut Check<'_, '_>, header: &Header) -> Option<()> {
     if header.has_texture() {
         check_atoms(check, header)?;
     }
     Some(())
 }
 
+/// Atoms are wholly in one file or the other, so nothing is left to fit (3.5-5).
+pub(crate) fn dictionary_fits(_: &mut Check<'_, '_>, _: &Header, _: &Header) -> bool {
+    true
+}
+
 /// Walks chapter 12 of a material, but for its statement of cost; gives the largest operations of a level's
 /// textures.
-pub(crate) fn check_tensor(
+pub(crate) fn check_material(
     check: &mut Check<'_, '_>,
     header: &Header,
     external: Option<&Header>,

@@ -14,7 +14,7 @@ use crate::batch::FilteredQuery;
 use crate::fast::finish::finish;
 use crate::fast::located::ReadySets;
 use crate::fast::table::bytes_from;
-use crate::fast::{Fast, ImageQuery, Textures};
+use crate::fast::{ImageQuery, Textures};
 use crate::kernel::colour::{Rgb, Values};
 use crate::kernel::direction::Taps;
 use crate::kernel::fixed::{ONE_Q15, clamp_magnitude, multiply_q15, round_shift};
@@ -24,10 +24,6 @@ use crate::kernel::position::{Axis, Place};
 use crate::kernel::words::{low_part, word};
 use crate::selvedge::Selvedge;
 use crate::walk::stream::{Ones, window};
-
-/// The fast paths of the sparse tensor.
-pub(crate) const FAST: Fast =
-    Fast { batch_scratch_len, batch: sample_batch, image_scratch_len, image: decode_image };
 
 /// Three channels side by side, and one that is not used.
 type Lanes = [i32; 4];
@@ -494,13 +490,13 @@ impl<'a, 's> Sampler<'a, 's> {
 }
 
 /// Words of scratch of a batch.
-fn batch_scratch_len(selvedge: &Selvedge<'_>, _count: usize) -> usize {
+pub(crate) fn batch_scratch_len(selvedge: &Selvedge<'_>, _count: usize) -> usize {
     let ready = ReadySets::scratch_len(selvedge.words(), selvedge.material());
     ready + Workspace::WORDS + Sampler::scratch_len(selvedge)
 }
 
 /// The samples of a batch, one after the other. `None` if the scratch is too short.
-fn sample_batch(
+pub(crate) fn batch(
     selvedge: &Selvedge<'_>,
     queries: &[FilteredQuery],
     scratch: &mut [i32],
@@ -526,13 +522,13 @@ fn sample_batch(
 }
 
 /// Words of scratch for an image: four an ABRDF atom.
-fn image_scratch_len(selvedge: &Selvedge<'_>) -> usize {
+pub(crate) fn image_scratch_len(selvedge: &Selvedge<'_>) -> usize {
     let count = word(selvedge.words(), part(selvedge.material(), FIBRES_PART)) as usize;
     count.wrapping_mul(4)
 }
 
 /// The textures of the three channels for every texel of a level, row by row.
-fn decode_image(
+pub(crate) fn image(
     selvedge: &Selvedge<'_>,
     query: &ImageQuery,
     scratch: &mut [i32],

@@ -9,7 +9,7 @@
 pub mod check;
 pub mod cost;
 #[cfg(feature = "batch")]
-mod fast;
+pub(crate) mod fast;
 
 use crate::kernel::colour::Values;
 use crate::kernel::direction::{Located, Taps};
@@ -303,7 +303,7 @@ pub fn layer_q20(
     words: Words<'_>,
     material: &Material,
     layer: u32,
-    place: Place,
+    place: &Place,
     light: Taps,
     view: Taps,
 ) -> Values {
@@ -389,9 +389,9 @@ pub fn layer_q20(
 pub fn sparse_tensor_textures_q20(
     words: Words<'_>,
     material: &Material,
-    place: Place,
-    light: Located,
-    view: Located,
+    place: &Place,
+    light: &Located,
+    view: &Located,
 ) -> Values {
     let mut sums = Values { c0: 0, c1: 0, c2: 0 };
     let mut layer = 0u32;

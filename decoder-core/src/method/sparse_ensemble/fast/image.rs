@@ -5,13 +5,15 @@
 //! That is what the order of products of 10.7 is for.
 
 use super::records::{Blend, atoms_of, factor, for_each_coefficient, record_of};
-use super::{RECORD_BOUND, Record, Tables, atom_light, atom_shift, atom_view, tables_of};
 use crate::fast::table::{Table, entry};
 use crate::fast::{ImageQuery, Textures};
 use crate::kernel::direction::Taps;
 use crate::kernel::fixed::{HALF_Q15, clamp_magnitude, multiply_q15, round_shift};
 use crate::kernel::material::{CHANNEL_FULL, channel_of};
 use crate::kernel::words::word;
+use crate::method::sparse_ensemble::{
+    RECORD_BOUND, Record, Tables, atom_light, atom_shift, atom_view, tables_of,
+};
 use crate::selvedge::Selvedge;
 
 /// Texels along the side of the largest block.
@@ -20,7 +22,7 @@ const LANES: usize = 16;
 type Lanes = [i32; LANES];
 
 /// Words of scratch: a product for each atom of the channel that has most.
-pub(super) fn scratch_len(selvedge: &Selvedge<'_>) -> usize {
+pub(crate) fn image_scratch_len(selvedge: &Selvedge<'_>) -> usize {
     let (words, material) = (selvedge.words(), selvedge.material());
     let total = |number: u32| {
         if channel_of(material, number).state != CHANNEL_FULL {
@@ -33,7 +35,7 @@ pub(super) fn scratch_len(selvedge: &Selvedge<'_>) -> usize {
 }
 
 /// The textures of an image, channel by channel.
-pub(super) fn decode(
+pub(crate) fn image(
     selvedge: &Selvedge<'_>,
     query: &ImageQuery,
     scratch: &mut [i32],

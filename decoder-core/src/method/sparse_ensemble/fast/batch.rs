@@ -7,11 +7,7 @@
 //! for speed and for a second reading, held equal by tests.
 
 use super::records::{Blend, Coefficient, factor, for_each_coefficient, record_of};
-use super::{
-    RECORD_BOUND, Record, Tables, atom_light, atom_shift, atom_view, coefficients_start, image, tables_of,
-};
 use crate::batch::FilteredQuery;
-use crate::fast::Fast;
 use crate::fast::finish::finish;
 use crate::fast::located::ReadySets;
 use crate::fast::table::{Table, entry};
@@ -22,15 +18,10 @@ use crate::kernel::interpolation::place_at_position;
 use crate::kernel::material::{CHANNEL_FULL, Material, channel_of};
 use crate::kernel::position::{Place, Span, block_count};
 use crate::kernel::words::word;
-use crate::selvedge::Selvedge;
-
-/// The fast paths of the sparse ensemble.
-pub(crate) const FAST: Fast = Fast {
-    batch_scratch_len: scratch_len,
-    batch: sample_batch,
-    image_scratch_len: image::scratch_len,
-    image: image::decode,
+use crate::method::sparse_ensemble::{
+    RECORD_BOUND, Record, Tables, atom_light, atom_shift, atom_view, coefficients_start, tables_of,
 };
+use crate::selvedge::Selvedge;
 
 /// Queries side by side.
 const LANES: usize = 8;
@@ -213,7 +204,7 @@ struct Scratch<'s> {
 }
 
 /// Words of scratch for `count` queries.
-fn scratch_len(selvedge: &Selvedge<'_>, count: usize) -> usize {
+pub(crate) fn batch_scratch_len(selvedge: &Selvedge<'_>, count: usize) -> usize {
     let per_query = STATE_WORDS + 4 * (ITEM_WORDS + ITEM_TEXTURES);
     let ready = ReadySets::scratch_len(selvedge.words(), selvedge.material());
     let shared = ready + 6 * COLUMNS + 2 * COLUMNS * LANES + largest_record(selvedge) * COEFFICIENT_WORDS;
@@ -268,7 +259,8 @@ fn split_scratch<'s>(selvedge: &Selvedge<'_>, count: usize, scratch: &'s mut [i3
     })
 }
 
-fn sample_batch(
+/// Samples level 0, block by block. `None` if the scratch is too short.
+pub(crate) fn batch(
     selvedge: &Selvedge<'_>,
     queries: &[FilteredQuery],
     scratch: &mut [i32],
