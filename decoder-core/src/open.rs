@@ -1,4 +1,5 @@
 //! Opening a file: every rule is checked once, and what comes back cannot fail.
+#![deny(clippy::arithmetic_side_effects)]
 
 use crate::container::directions::{check_directions, largest_candidates};
 use crate::container::directory::{
@@ -160,12 +161,17 @@ fn walk_external(
         return check.ensure(dictionary.is_none(), Rule::ExternalUnwanted, 0, 0).then_some(None);
     };
     let digest = check_external(check, section)?;
-    let stated_length = check.word_at(section.offset + 32);
+    let stated_length = check.word_at(section.offset.wrapping_add(32));
     let Some(dictionary) = dictionary else {
         check.find(Rule::ExternalMissing, section.offset, stated_length);
         return None;
     };
-    if !check.ensure(stated_length <= limits.bytes, Rule::LimitBytes, section.offset + 32, stated_length) {
+    if !check.ensure(
+        stated_length <= limits.bytes,
+        Rule::LimitBytes,
+        section.offset.wrapping_add(32),
+        stated_length,
+    ) {
         return None;
     }
     let same = dictionary.len() == stated_length as usize && sha256(dictionary) == digest;
@@ -187,11 +193,11 @@ fn describe(header: &Header) -> Material {
     let parameter = header.transfer_parameter;
     let is_log = header.transfer == TRANSFER_LOG2;
     let offset_mantissa = if is_log && parameter != 0 { (parameter & 0x7f_ffff | 0x80_0000) << 8 } else { 0 };
-    let exponent = if is_log { (parameter >> 23) as i32 - 127 } else { parameter as i32 };
-    let mut full_count = 0;
+    let exponent = if is_log { ((parameter >> 23) as i32).wrapping_sub(127) } else { parameter as i32 };
+    let mut full_count = 0u32;
     let channels = header.states.map(|state| {
         let full_rank = full_count;
-        full_count += (state == CHANNEL_FULL) as u32;
+        full_count = full_count.wrapping_add((state == CHANNEL_FULL) as u32);
         Channel { state, full_rank, ..Channel::default() }
     });
     Material {

@@ -42,16 +42,20 @@ pub fn reciprocal_of(whole: u32) -> (u32, u32) {
 
 /// The cosine of a point of the disc, Q15 (5.3-4): `(1 - r^2) / (1 + r^2)`, halves up.
 pub fn cosine_of(x_q14: i32, y_q14: i32) -> u32 {
-    let square = (x_q14 as i64 * x_q14 as i64 + y_q14 as i64 * y_q14 as i64) as u64;
+    let square = (x_q14 as i64)
+        .wrapping_mul(x_q14 as i64)
+        .wrapping_add((y_q14 as i64).wrapping_mul(y_q14 as i64)) as u64;
     let one = 1u64 << 28;
-    let below = one + square;
-    (((one.saturating_sub(square)) << 16) + below).checked_div(2 * below).unwrap_or(0) as u32
+    let below = one.wrapping_add(square);
+    ((one.saturating_sub(square)) << 16).wrapping_add(below).checked_div(below.wrapping_mul(2)).unwrap_or(0)
+        as u32
 }
 
 /// First and last Q14 coordinate of cell `cell` of `grid_size` (5.5-1).
 pub fn cell_range(cell: u32, grid_size: u32) -> (i32, i32) {
-    let first = |cell: u32| (cell << 15).div_ceil(grid_size.max(1)) as i32 - 16384;
-    let last = if cell + 1 >= grid_size { 16384 } else { first(cell + 1) - 1 };
+    let first = |cell: u32| ((cell << 15).div_ceil(grid_size.max(1)) as i32).wrapping_sub(16384);
+    let last =
+        if cell.wrapping_add(1) >= grid_size { 16384 } else { first(cell.wrapping_add(1)).wrapping_sub(1) };
     (first(cell), last)
 }
 
@@ -78,9 +82,9 @@ impl Set {
     }
 
     fn corners(&self, check: &Check<'_, '_>, triangle: u32) -> [u32; 3] {
-        let at = self.triangles + triangle * 3;
+        let at = self.triangles.wrapping_add(triangle.wrapping_mul(3));
         let first = word(check.words, at);
-        [first & 0xffff, first >> 16, word(check.words, at + 1) & 0xffff]
+        [first & 0xffff, first >> 16, word(check.words, at.wrapping_add(1)) & 0xffff]
     }
 
     fn triangle(&self, check: &Check<'_, '_>, triangle: u32) -> [Point; 3] {
@@ -88,24 +92,29 @@ impl Set {
     }
 
     fn hull_vertex(&self, check: &Check<'_, '_>, edge: u32) -> u32 {
-        let edge = if edge >= self.hull_count { edge - self.hull_count } else { edge };
-        word(check.words, self.hull + edge * 2) & 0xffff
+        let edge = if edge >= self.hull_count { edge.wrapping_sub(self.hull_count) } else { edge };
+        word(check.words, self.hull.wrapping_add(edge.wrapping_mul(2))) & 0xffff
     }
 
     /// Byte offset of a word.
     fn byte(&self, index: u32) -> u32 {
-        self.offset + (index - self.start) * 4
+        self.offset.wrapping_add(index.wrapping_sub(self.start).wrapping_mul(4))
     }
 
     /// Triangles that have the directed side `a` to `b`: candidates of the cell that holds `a`.
     fn sides(&self, check: &Check<'_, '_>, a: u32, b: u32) -> u32 {
         let (x, y) = self.point(check, a);
-        let cell = grid_cell(y, self.grid_size) * self.grid_size + grid_cell(x, self.grid_size);
-        let (from, to) = (word(check.words, self.grid + cell), word(check.words, self.grid + cell + 1));
-        let candidates = self.grid + self.grid_size * self.grid_size + 1;
+        let cell = grid_cell(y, self.grid_size)
+            .wrapping_mul(self.grid_size)
+            .wrapping_add(grid_cell(x, self.grid_size));
+        let (from, to) = (
+            word(check.words, self.grid.wrapping_add(cell)),
+            word(check.words, self.grid.wrapping_add(cell).wrapping_add(1)),
+        );
+        let candidates = self.grid.wrapping_add(self.grid_size.wrapping_mul(self.grid_size)).wrapping_add(1);
         (from..to)
             .filter(|&at| {
-                let [p, q, r] = self.corners(check, word(check.words, candidates + at));
+                let [p, q, r] = self.corners(check, word(check.words, candidates.wrapping_add(at)));
                 (p, q) == (a, b) || (q, r) == (a, b) || (r, p) == (a, b)
             })
             .count() as u32
@@ -116,11 +125,14 @@ impl Set {
 pub(crate) fn largest_candidates(check: &Check<'_, '_>, section: Section) -> (u32, u32) {
     let start = check.section_start(section);
     let grid = grid_start(check.words, start);
-    let size = word(check.words, start + 3);
-    let largest = (0..size * size)
-        .map(|cell| word(check.words, grid + cell + 1) - word(check.words, grid + cell))
+    let size = word(check.words, start.wrapping_add(3));
+    let largest = (0..size.wrapping_mul(size))
+        .map(|cell| {
+            word(check.words, grid.wrapping_add(cell).wrapping_add(1))
+                .wrapping_sub(word(check.words, grid.wrapping_add(cell)))
+        })
         .max();
-    (largest.unwrap_or(0), word(check.words, start + 2))
+    (largest.unwrap_or(0), word(check.words, start.wrapping_add(2)))
 }
 
 /// Walks 5.3 to 5.7. `false` if the set cannot be used.
@@ -130,7 +142,7 @@ pub(crate) fn check_directions(check: &mut Check<'_, '_>, section: Section, coun
     if !check.ensure(section.length >= 32, Rule::DirectionsLength, offset, section.length) {
         return false;
     }
-    let field = |n: u32| word(check.words, start + n);
+    let field = |n: u32| word(check.words, start.wrapping_add(n));
     let (stated, triangle_count, hull_count, grid_size, candidate_count) =
         (field(0), field(1), field(2), field(3), field(4));
     let counts = [
@@ -140,12 +152,22 @@ pub(crate) fn check_directions(check: &mut Check<'_, '_>, section: Section, coun
             triangle_count,
             triangle_count <= 2048
                 && if triangle_count > 0 {
-                    hull_count >= 3 && triangle_count + 2 + hull_count.min(4096) == 2 * count
+                    hull_count >= 3
+                        && triangle_count.wrapping_add(2).wrapping_add(hull_count.min(4096))
+                            == count.wrapping_mul(2)
                 } else {
                     true
                 },
         ),
-        (8, hull_count, if triangle_count > 0 { hull_count <= count } else { hull_count == 2 * (count - 1) }),
+        (
+            8,
+            hull_count,
+            if triangle_count > 0 {
+                hull_count <= count
+            } else {
+                hull_count == count.wrapping_sub(1).wrapping_mul(2)
+            },
+        ),
         (12, grid_size, (1..=64).contains(&grid_size)),
         (16, candidate_count, candidate_count <= 1 << 20),
         (20, field(5), field(5) == 0),
@@ -154,17 +176,18 @@ pub(crate) fn check_directions(check: &mut Check<'_, '_>, section: Section, coun
     ];
     let mut sound = true;
     for (at, found, holds) in counts {
-        sound &= check.ensure(holds, Rule::DirectionsCounts, offset + at, found);
+        sound &= check.ensure(holds, Rule::DirectionsCounts, offset.wrapping_add(at), found);
     }
     if !sound {
         return false;
     }
-    let expected = 32
-        + count * 8
-        + triangle_count * 12
-        + hull_count * 8
-        + (grid_size * grid_size + 1) * 4
-        + candidate_count * 4;
+    let expected = count
+        .wrapping_mul(8)
+        .wrapping_add(32)
+        .wrapping_add(triangle_count.wrapping_mul(12))
+        .wrapping_add(hull_count.wrapping_mul(8))
+        .wrapping_add(grid_size.wrapping_mul(grid_size).wrapping_add(1).wrapping_mul(4))
+        .wrapping_add(candidate_count.wrapping_mul(4));
     if !check.ensure(section.length == expected, Rule::DirectionsLength, offset, section.length) {
         return false;
     }
@@ -194,18 +217,25 @@ fn check_points(check: &mut Check<'_, '_>, set: &Set) -> bool {
     let mut sound = true;
     for i in 0..set.count {
         let (x, y) = set.point(check, i);
-        let at = set.byte(set.start + 8 + i * 2);
+        let at = set.byte(set.start.wrapping_add(8).wrapping_add(i.wrapping_mul(2)));
         // Within the square first: beyond it the sum of squares could overflow.
-        let inside = x.abs() <= 16384 && y.abs() <= 16384 && x * x + y * y <= 1 << 28;
+        let inside = x.abs() <= 16384
+            && y.abs() <= 16384
+            && x.wrapping_mul(x).wrapping_add(y.wrapping_mul(y)) <= 1 << 28;
         let differs = (0..i).all(|other| set.point(check, other) != (x, y));
         sound &= check.ensure(
             inside && differs,
             Rule::DirectionPoint,
             at,
-            word(check.words, set.start + 8 + i * 2),
+            word(check.words, set.start.wrapping_add(8).wrapping_add(i.wrapping_mul(2))),
         );
-        let cosine = word(check.words, set.start + 9 + i * 2);
-        sound &= check.ensure(!inside || cosine == cosine_of(x, y), Rule::DirectionCosine, at + 4, cosine);
+        let cosine = word(check.words, set.start.wrapping_add(9).wrapping_add(i.wrapping_mul(2)));
+        sound &= check.ensure(
+            !inside || cosine == cosine_of(x, y),
+            Rule::DirectionCosine,
+            at.wrapping_add(4),
+            cosine,
+        );
         if check.stopped {
             return false;
         }
@@ -217,7 +247,7 @@ fn check_triangles(check: &mut Check<'_, '_>, set: &Set) -> bool {
     let mut sound = true;
     let mut before = None;
     for t in 0..set.triangle_count {
-        let at = set.byte(set.triangles + t * 3);
+        let at = set.byte(set.triangles.wrapping_add(t.wrapping_mul(3)));
         let corners = set.corners(check, t);
         let [a, b, c] = corners;
         let named = a < b && a < c && b < set.count && c < set.count && b != c;
@@ -227,8 +257,12 @@ fn check_triangles(check: &mut Check<'_, '_>, set: &Set) -> bool {
         } else {
             0
         };
-        if !check.ensure(named && area > 0, Rule::TriangleShape, at, word(check.words, set.triangles + t * 3))
-        {
+        if !check.ensure(
+            named && area > 0,
+            Rule::TriangleShape,
+            at,
+            word(check.words, set.triangles.wrapping_add(t.wrapping_mul(3))),
+        ) {
             sound = false;
             if check.stopped {
                 return false;
@@ -236,15 +270,18 @@ fn check_triangles(check: &mut Check<'_, '_>, set: &Set) -> bool {
             continue;
         }
         let (shift, reciprocal) = reciprocal_of(area as u32);
-        let (second, third) =
-            (word(check.words, set.triangles + t * 3 + 1), word(check.words, set.triangles + t * 3 + 2));
-        sound &= check.ensure(second >> 16 == shift, Rule::TriangleReciprocal, at + 6, second >> 16);
-        sound &= check.ensure(third == reciprocal, Rule::TriangleReciprocal, at + 8, third);
+        let (second, third) = (
+            word(check.words, set.triangles.wrapping_add(t.wrapping_mul(3)).wrapping_add(1)),
+            word(check.words, set.triangles.wrapping_add(t.wrapping_mul(3)).wrapping_add(2)),
+        );
+        sound &=
+            check.ensure(second >> 16 == shift, Rule::TriangleReciprocal, at.wrapping_add(6), second >> 16);
+        sound &= check.ensure(third == reciprocal, Rule::TriangleReciprocal, at.wrapping_add(8), third);
         sound &= check.ensure(
             before.is_none_or(|before| before < corners),
             Rule::TriangleOrder,
             at,
-            word(check.words, set.triangles + t * 3),
+            word(check.words, set.triangles.wrapping_add(t.wrapping_mul(3))),
         );
         before = Some(corners);
         if check.stopped {
@@ -255,41 +292,44 @@ fn check_triangles(check: &mut Check<'_, '_>, set: &Set) -> bool {
 }
 
 fn check_grid(check: &mut Check<'_, '_>, set: &Set) -> bool {
-    let cells = set.grid_size * set.grid_size;
+    let cells = set.grid_size.wrapping_mul(set.grid_size);
     let mut sound = true;
     let mut before = 0;
     for cell in 0..=cells {
-        let from = word(check.words, set.grid + cell);
+        let from = word(check.words, set.grid.wrapping_add(cell));
         let holds = match cell {
             0 => from == 0,
             _ if cell == cells => from == set.candidate_count && from >= before,
             _ => from >= before && from <= set.candidate_count,
         };
-        if !check.ensure(holds, Rule::GridStarts, set.byte(set.grid + cell), from) {
+        if !check.ensure(holds, Rule::GridStarts, set.byte(set.grid.wrapping_add(cell)), from) {
             return false;
         }
         if !check.ensure(
-            from - before <= CELL_LIMIT,
+            from.wrapping_sub(before) <= CELL_LIMIT,
             Rule::GridCell,
-            set.byte(set.grid + cell),
-            from - before,
+            set.byte(set.grid.wrapping_add(cell)),
+            from.wrapping_sub(before),
         ) {
             return false;
         }
         before = from;
     }
-    let candidates = set.grid + cells + 1;
+    let candidates = set.grid.wrapping_add(cells).wrapping_add(1);
     for cell_y in 0..set.grid_size {
         for cell_x in 0..set.grid_size {
-            let cell = cell_y * set.grid_size + cell_x;
+            let cell = cell_y.wrapping_mul(set.grid_size).wrapping_add(cell_x);
             let (x, y) = (cell_range(cell_x, set.grid_size), cell_range(cell_y, set.grid_size));
             let mut previous = None;
-            for at in word(check.words, set.grid + cell)..word(check.words, set.grid + cell + 1) {
-                let triangle = word(check.words, candidates + at);
+            for at in word(check.words, set.grid.wrapping_add(cell))
+                ..word(check.words, set.grid.wrapping_add(cell).wrapping_add(1))
+            {
+                let triangle = word(check.words, candidates.wrapping_add(at));
                 let holds = triangle < set.triangle_count
                     && previous.is_none_or(|p| p < triangle)
                     && meets_cell(set.triangle(check, triangle), x, y);
-                sound &= check.ensure(holds, Rule::GridCandidate, set.byte(candidates + at), triangle);
+                sound &=
+                    check.ensure(holds, Rule::GridCandidate, set.byte(candidates.wrapping_add(at)), triangle);
                 previous = Some(triangle);
                 if check.stopped {
                     return false;
@@ -301,7 +341,7 @@ fn check_grid(check: &mut Check<'_, '_>, set: &Set) -> bool {
         return false;
     }
     // Every listed one meets its cell and none is listed twice, so equal counts mean equal sets.
-    let mut meetings = 0;
+    let mut meetings = 0u32;
     for t in 0..set.triangle_count {
         let triangle = set.triangle(check, t);
         let span = |f: fn(Point) -> i32| {
@@ -310,57 +350,69 @@ fn check_grid(check: &mut Check<'_, '_>, set: &Set) -> bool {
         };
         for cell_y in span(|p| p.1) {
             for cell_x in span(|p| p.0) {
-                meetings += meets_cell(
+                meetings = meetings.wrapping_add(meets_cell(
                     triangle,
                     cell_range(cell_x, set.grid_size),
                     cell_range(cell_y, set.grid_size),
-                ) as u32;
+                ) as u32);
             }
         }
     }
-    check.ensure(meetings == set.candidate_count, Rule::GridComplete, set.offset + 16, set.candidate_count)
+    check.ensure(
+        meetings == set.candidate_count,
+        Rule::GridComplete,
+        set.offset.wrapping_add(16),
+        set.candidate_count,
+    )
 }
 
 fn check_hull(check: &mut Check<'_, '_>, set: &Set) -> bool {
     for edge in 0..set.hull_count {
-        let at = set.hull + edge * 2;
+        let at = set.hull.wrapping_add(edge.wrapping_mul(2));
         let first = word(check.words, at);
-        let (a, b) = (first & 0xffff, set.hull_vertex(check, edge + 1));
+        let (a, b) = (first & 0xffff, set.hull_vertex(check, edge.wrapping_add(1)));
         if !check.ensure(a < set.count && b < set.count && a != b, Rule::HullEdge, set.byte(at), first) {
             return false;
         }
         let (p, q) = (set.point(check, a), set.point(check, b));
         let (shift, reciprocal) = reciprocal_of(dot_product(p.0, p.1, q.0, q.1, q.0, q.1) as u32);
-        let holds = first >> 16 == shift && word(check.words, at + 1) == reciprocal;
+        let holds = first >> 16 == shift && word(check.words, at.wrapping_add(1)) == reciprocal;
         if !check.ensure(holds, Rule::HullEdge, set.byte(at), first) {
             return false;
         }
     }
     // Once around is four quadrants of the edges' direction; a left turn never skips two.
-    let mut quadrants = 0;
+    let mut quadrants = 0u32;
     let mut before: Option<u32> = None;
     for edge in 0..=set.hull_count {
         if set.hull_count == 0 {
             break;
         }
-        let [p, q, r] =
-            [edge, edge + 1, edge + 2].map(|n| set.point(check, set.hull_vertex(check, n % set.hull_count)));
+        let [p, q, r] = [edge, edge.wrapping_add(1), edge.wrapping_add(2)]
+            .map(|n| set.point(check, set.hull_vertex(check, n.checked_rem(set.hull_count).unwrap_or(0))));
         let turn = cross(p.0, p.1, q.0, q.1, r.0, r.1);
         let back = dot_product(q.0, q.1, p.0, p.1, r.0, r.1) > 0;
         let flat = set.triangle_count == 0;
         // A flat set goes along a line and back: straight on but for its two ends, where it returns.
-        let end = flat && (edge + 1) % set.hull_count % (set.hull_count / 2).max(1) == 0;
+        let end = flat
+            && edge
+                .wrapping_add(1)
+                .checked_rem(set.hull_count)
+                .unwrap_or(0)
+                .checked_rem((set.hull_count / 2).max(1))
+                .unwrap_or(0)
+                == 0;
         let turns = if flat { turn == 0 && back == end } else { turn > 0 || turn == 0 && !back };
         if !check.ensure(
             turns,
             Rule::HullConvex,
-            set.byte(set.hull + (edge % set.hull_count) * 2),
-            edge % set.hull_count,
+            set.byte(set.hull.wrapping_add(edge.checked_rem(set.hull_count).unwrap_or(0).wrapping_mul(2))),
+            edge.checked_rem(set.hull_count).unwrap_or(0),
         ) {
             return false;
         }
-        let (dx, dy) = (q.0 - p.0, q.1 - p.1);
-        let quadrant = if dx > 0 && dy >= 0 {
+        let (dx, dy) = (q.0.wrapping_sub(p.0), q.1.wrapping_sub(p.1));
+        let quadrant: u32 = if dx > 0 && dy >= 0 {
             0
         } else if dx <= 0 && dy > 0 {
             1
@@ -369,7 +421,8 @@ fn check_hull(check: &mut Check<'_, '_>, set: &Set) -> bool {
         } else {
             3
         };
-        quadrants += before.map_or(0, |before| (quadrant + 4 - before) % 4);
+        quadrants = quadrants
+            .wrapping_add(before.map_or(0, |before| quadrant.wrapping_add(4).wrapping_sub(before) % 4));
         before = Some(quadrant);
     }
     let once = set.triangle_count == 0 || quadrants == 4;
@@ -377,14 +430,14 @@ fn check_hull(check: &mut Check<'_, '_>, set: &Set) -> bool {
 }
 
 fn check_cover(check: &mut Check<'_, '_>, set: &Set) -> bool {
-    let mut open_sides = 0;
+    let mut open_sides = 0u32;
     for t in 0..set.triangle_count {
         let [a, b, c] = set.corners(check, t);
         for (p, q) in [(a, b), (b, c), (c, a)] {
             let neighbours = set.sides(check, q, p);
-            open_sides += (neighbours == 0) as u32;
+            open_sides = open_sides.wrapping_add((neighbours == 0) as u32);
             let holds = set.sides(check, p, q) == 1 && neighbours <= 1;
-            if !check.ensure(holds, Rule::Cover, set.byte(set.triangles + t * 3), t) {
+            if !check.ensure(holds, Rule::Cover, set.byte(set.triangles.wrapping_add(t.wrapping_mul(3))), t) {
                 return false;
             }
         }
@@ -397,9 +450,9 @@ fn check_cover(check: &mut Check<'_, '_>, set: &Set) -> bool {
         return check.ensure(all, Rule::Cover, set.byte(set.hull), 0);
     }
     for edge in 0..set.hull_count {
-        let (a, b) = (set.hull_vertex(check, edge), set.hull_vertex(check, edge + 1));
+        let (a, b) = (set.hull_vertex(check, edge), set.hull_vertex(check, edge.wrapping_add(1)));
         let holds = set.sides(check, a, b) == 1 && set.sides(check, b, a) == 0;
-        if !check.ensure(holds, Rule::Cover, set.byte(set.hull + edge * 2), a) {
+        if !check.ensure(holds, Rule::Cover, set.byte(set.hull.wrapping_add(edge.wrapping_mul(2))), a) {
             return false;
         }
     }
@@ -408,6 +461,7 @@ fn check_cover(check: &mut Check<'_, '_>, set: &Set) -> bool {
 }
 
 #[cfg(test)]
+#[allow(clippy::arithmetic_side_effects, reason = "a test may end by overflow")]
 mod tests {
     use super::*;
 

@@ -95,7 +95,8 @@ pub(crate) fn check_directory(check: &mut Check<'_, '_>, header: &Header) -> boo
     let length = check.bytes.len().min(u32::MAX as usize) as u64;
     let mut sound = true;
     let mut before: Option<(u32, u32)> = None;
-    let mut end = HEADER_LENGTH as u64 + ENTRY_LENGTH as u64 * header.section_count as u64;
+    let mut end =
+        (HEADER_LENGTH as u64).wrapping_add((ENTRY_LENGTH as u64).wrapping_mul(header.section_count as u64));
     for index in 0..header.section_count {
         let section = read_entry(|offset| check.word_at(offset), index);
         let known = is_known(section.kind) || section.kind >= OPTIONAL;
@@ -107,7 +108,7 @@ pub(crate) fn check_directory(check: &mut Check<'_, '_>, header: &Header) -> boo
         let aligned = end.next_multiple_of(16);
         let placed = section.offset as u64 == aligned;
         sound &= check.ensure(placed, Rule::SectionOffset, section.entry.wrapping_add(4), section.offset);
-        let section_end = section.offset as u64 + section.length as u64;
+        let section_end = (section.offset as u64).wrapping_add(section.length as u64);
         let fits = section.length % 4 == 0 && section_end <= length;
         sound &= check.ensure(fits, Rule::SectionLength, section.entry.wrapping_add(8), section.length);
         if check.stopped || !sound {

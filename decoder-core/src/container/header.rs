@@ -78,7 +78,8 @@ impl Header {
     pub fn read(word_at: impl Fn(u32) -> u32) -> Header {
         let word = |index: u32| word_at(index.wrapping_mul(4));
         let byte = |index: u32, n: u32| (word(index) >> (n & 3).wrapping_mul(8)) & 0xff;
-        let entry = |n: u32| ((word(17u32.wrapping_add(n >> 1)) << (16 - ((n & 1) << 4))) as i32) >> 16;
+        let entry =
+            |n: u32| ((word(17u32.wrapping_add(n >> 1)) << (16u32.wrapping_sub((n & 1) << 4))) as i32) >> 16;
         Header {
             minor_version: word(2) >> 16,
             file_length: word(3),

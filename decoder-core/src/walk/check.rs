@@ -111,7 +111,7 @@ impl<'a, 's> Check<'a, 's> {
         for (index, &[a, b, c, d]) in pairs.iter().enumerate() {
             let index = index as u32;
             let at = offset.wrapping_add(index.wrapping_mul(4));
-            let last = odd && index % row_words.max(1) == row_words.wrapping_sub(1);
+            let last = odd && index.checked_rem(row_words.max(1)).unwrap_or(0) == row_words.wrapping_sub(1);
             let (low, high) = (u16::from_le_bytes([a, b]), u16::from_le_bytes([c, d]));
             if low == 0x8000 {
                 self.find(rule, at, low as u32);

@@ -3,7 +3,11 @@
 /// Operations to locate a direction at worst (4.2-3): the grid (2), every candidate (6), every edge of the
 /// hull (6), the begin of the hull, what refines, a ratio and two cosines (7).
 const fn locate_operations(candidates: u32, hull_count: u32) -> u64 {
-    2 + 6 * candidates as u64 + 6 * hull_count as u64 + 7
+    (candidates as u64)
+        .wrapping_mul(6)
+        .wrapping_add(2)
+        .wrapping_add((hull_count as u64).wrapping_mul(6))
+        .wrapping_add(7)
 }
 
 /// What the common part of a sample's cost depends on (4.2-1).
@@ -36,6 +40,11 @@ pub fn filtered_operations(shape: Shape, textures: u64) -> u32 {
         (shape.candidates, shape.hull_counts);
     let light = locate_operations(light_candidates, light_hull);
     let view = locate_operations(view_candidates, view_hull);
-    let tables = MEAN * shape.means as u64 + SCALE * shape.scales as u64;
-    (AXES + light + view + tables + textures + COLOUR).min(u32::MAX as u64) as u32
+    let tables = MEAN.wrapping_mul(shape.means as u64).wrapping_add(SCALE.wrapping_mul(shape.scales as u64));
+    AXES.wrapping_add(light)
+        .wrapping_add(view)
+        .wrapping_add(tables)
+        .wrapping_add(textures)
+        .wrapping_add(COLOUR)
+        .min(u32::MAX as u64) as u32
 }

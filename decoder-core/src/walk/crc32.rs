@@ -11,23 +11,23 @@ const fn tables() -> [[u32; 256]; STRIDE] {
     let mut byte = 0;
     while byte < 256 {
         let mut remainder = byte as u32;
-        let mut bit = 0;
+        let mut bit = 0u32;
         while bit < 8 {
             remainder = (remainder >> 1) ^ (0xedb8_8320 & (remainder & 1).wrapping_neg());
-            bit += 1;
+            bit = bit.wrapping_add(1);
         }
         tables[0][byte] = remainder;
-        byte += 1;
+        byte = byte.wrapping_add(1);
     }
     let mut table = 1;
     while table < STRIDE {
         let mut byte = 0;
         while byte < 256 {
-            let before = tables[table - 1][byte];
+            let before = tables[table.wrapping_sub(1)][byte];
             tables[table][byte] = (before >> 8) ^ tables[0][(before & 0xff) as usize];
-            byte += 1;
+            byte = byte.wrapping_add(1);
         }
-        table += 1;
+        table = table.wrapping_add(1);
     }
     tables
 }
@@ -77,6 +77,7 @@ pub fn crc32(before: u32, bytes: &[u8]) -> u32 {
 }
 
 #[cfg(test)]
+#[allow(clippy::arithmetic_side_effects, reason = "a test may end by overflow")]
 mod tests {
     use super::crc32;
 

@@ -95,6 +95,7 @@ pub fn sha256(bytes: &[u8]) -> Digest {
 }
 
 #[cfg(test)]
+#[allow(clippy::arithmetic_side_effects, reason = "a test may end by overflow")]
 mod tests {
     use super::sha256;
 

@@ -1,4 +1,5 @@
 //! Checks of the sparse ensemble's sections (chapter 10).
+#![deny(clippy::arithmetic_side_effects)]
 
 use crate::container::directory::find_section;
 use crate::container::header::Header;
@@ -120,7 +121,7 @@ pub(crate) fn check_material(
         *slot = Some(section);
         let starts = [angular.start, spatial.start, check.section_start(section)];
         for (first, start) in [ANGULAR_PART, SPATIAL_PART, ATOMS_PART].into_iter().zip(starts) {
-            material.set_part(first + c, start);
+            material.set_part(first.wrapping_add(c), start);
         }
     }
     let first = find_in_coefficients(check, header);
@@ -134,7 +135,9 @@ pub(crate) fn check_material(
                 let Some(atoms) = atoms else { continue };
                 let section = find_section(check, header, COEFFICIENTS, layer_instance(level, layer, c))?;
                 match check_coefficients(check, section, header, level, atoms) {
-                    Some(largest) => at_level += record_operations(largest, header.edge),
+                    Some(largest) => {
+                        at_level = at_level.wrapping_add(record_operations(largest, header.edge))
+                    }
                     None => sound = false,
                 }
                 if check.stopped {
@@ -144,7 +147,7 @@ pub(crate) fn check_material(
         }
         records = records.max(at_level);
     }
-    sound.then_some(4 * records)
+    sound.then_some(records.wrapping_mul(4))
 }
 
 /// Factors of the external dictionary, which was checked with its own file.
@@ -177,8 +180,8 @@ pub(crate) struct Factors {
 
 /// Columns of the two tables of dictionary `k` of a section of factors.
 pub(crate) fn columns(words: Words<'_>, start: u32, k: u32) -> (u32, u32) {
-    let at = start + 2 + k * 4;
-    (word(words, at), word(words, at + 1))
+    let at = start.wrapping_add(2).wrapping_add(k.wrapping_mul(4));
+    (word(words, at), word(words, at.wrapping_add(1)))
 }
 
 /// Walks 10.1 for the angular factors (`first_rows` lights, `second_rows` views) or 10.2 for the spatial.
@@ -194,29 +197,34 @@ pub(crate) fn check_factors(
         return None;
     }
     let count = check.word_at(offset);
-    let reserved = check.word_at(offset + 4);
-    let counted =
-        (1..=DICTIONARY_LIMIT).contains(&count) && section.length >= 8 + count.min(DICTIONARY_LIMIT) * 16;
+    let reserved = check.word_at(offset.wrapping_add(4));
+    let counted = (1..=DICTIONARY_LIMIT).contains(&count)
+        && section.length >= count.min(DICTIONARY_LIMIT).wrapping_mul(16).wrapping_add(8);
     if !check.ensure(counted, Rule::FactorCounts, offset, count) {
         return None;
     }
-    check.ensure(reserved == 0, Rule::FactorCounts, offset + 4, reserved);
+    check.ensure(reserved == 0, Rule::FactorCounts, offset.wrapping_add(4), reserved);
     let factors = Factors { start: check.section_start(section), count };
-    let mut end = 8 + count as u64 * 16;
+    let mut end = (count as u64).wrapping_mul(16).wrapping_add(8);
     for k in 0..count {
-        let at = offset + 8 + k * 16;
+        let at = offset.wrapping_add(8).wrapping_add(k.wrapping_mul(16));
         let (first, second) = columns(check.words, factors.start, k);
         for (n, found) in [(0, first), (4, second)] {
-            if !check.ensure((1..=limit).contains(&found), Rule::FactorCounts, at + n, found) {
+            if !check.ensure((1..=limit).contains(&found), Rule::FactorCounts, at.wrapping_add(n), found) {
                 return None;
             }
         }
         for (n, rows, columns) in [(8, first_rows, first), (12, second_rows, second)] {
-            let stated = check.word_at(at + n);
-            if !check.ensure(stated as u64 * 4 == end, Rule::FactorOffset, at + n, stated) {
+            let stated = check.word_at(at.wrapping_add(n));
+            if !check.ensure(
+                (stated as u64).wrapping_mul(4) == end,
+                Rule::FactorOffset,
+                at.wrapping_add(n),
+                stated,
+            ) {
                 return None;
             }
-            end += rows as u64 * columns.div_ceil(2) as u64 * 4;
+            end = end.wrapping_add((rows as u64).wrapping_mul(columns.div_ceil(2) as u64).wrapping_mul(4));
         }
     }
     if !check.ensure(section.length as u64 == end, Rule::FactorLength, offset, section.length) {
@@ -225,8 +233,9 @@ pub(crate) fn check_factors(
     for k in 0..count {
         let (first, second) = columns(check.words, factors.start, k);
         for (n, rows, columns) in [(8, first_rows, first), (12, second_rows, second)] {
-            let table = check.word_at(offset + 8 + k * 16 + n);
-            check.packed_rows(Rule::FactorEntry, offset + table * 4, rows, columns);
+            let table =
+                check.word_at(offset.wrapping_add(8).wrapping_add(k.wrapping_mul(16)).wrapping_add(n));
+            check.packed_rows(Rule::FactorEntry, offset.wrapping_add(table.wrapping_mul(4)), rows, columns);
             if check.stopped {
                 return None;
             }
@@ -244,21 +253,21 @@ pub(crate) fn check_atoms(
 ) -> bool {
     let count = angular.count;
     let offset = section.offset;
-    let head = 8 + count * 8;
+    let head = count.wrapping_mul(8).wrapping_add(8);
     if !check.ensure(section.length >= head, Rule::AtomsLength, offset, section.length) {
         return false;
     }
     let stated = check.word_at(offset);
-    let reserved = check.word_at(offset + 4);
+    let reserved = check.word_at(offset.wrapping_add(4));
     let mut sound = check.ensure(stated == count, Rule::AtomsCounts, offset, stated);
-    check.ensure(reserved == 0, Rule::AtomsCounts, offset + 4, reserved);
+    check.ensure(reserved == 0, Rule::AtomsCounts, offset.wrapping_add(4), reserved);
     let mut end = head as u64;
     for k in 0..count {
-        let at = offset + 8 + k * 8;
-        let (atoms, start) = (check.word_at(at), check.word_at(at + 4));
-        let holds = atoms <= ATOM_LIMIT && start as u64 * 4 == end;
+        let at = offset.wrapping_add(8).wrapping_add(k.wrapping_mul(8));
+        let (atoms, start) = (check.word_at(at), check.word_at(at.wrapping_add(4)));
+        let holds = atoms <= ATOM_LIMIT && (start as u64).wrapping_mul(4) == end;
         sound &= check.ensure(holds, Rule::AtomsCounts, at, atoms);
-        end += atoms.min(ATOM_LIMIT) as u64 * 8;
+        end = end.wrapping_add((atoms.min(ATOM_LIMIT) as u64).wrapping_mul(8));
     }
     sound &= check.ensure(section.length as u64 == end, Rule::AtomsLength, offset, section.length);
     if !sound {
@@ -267,11 +276,14 @@ pub(crate) fn check_atoms(
     for k in 0..count {
         let (lights, views) = columns(check.words, angular.start, k);
         let (xs, ys) = columns(check.words, spatial.start, k);
-        let (atoms, start) = (check.word_at(offset + 8 + k * 8), check.word_at(offset + 12 + k * 8));
+        let (atoms, start) = (
+            check.word_at(offset.wrapping_add(8).wrapping_add(k.wrapping_mul(8))),
+            check.word_at(offset.wrapping_add(12).wrapping_add(k.wrapping_mul(8))),
+        );
         let mut before = None;
         for i in 0..atoms {
-            let at = offset + start * 4 + i * 8;
-            let (atom, quantiser) = (check.word_at(at), check.word_at(at + 4));
+            let at = offset.wrapping_add(start.wrapping_mul(4)).wrapping_add(i.wrapping_mul(8));
+            let (atom, quantiser) = (check.word_at(at), check.word_at(at.wrapping_add(4)));
             let named = atom_view(atom) < views
                 && atom_light(atom) < lights
                 && atom_x(atom) < xs
@@ -280,8 +292,8 @@ pub(crate) fn check_atoms(
             sound &= check.ensure(before.is_none_or(|before| before < atom >> 4), Rule::AtomOrder, at, atom);
             before = Some(atom >> 4);
             let base = ((quantiser << 16) as i32) >> 16;
-            let holds = base != -32768 && base + (quantiser >> 16) as i32 <= 32_767;
-            sound &= check.ensure(holds, Rule::AtomQuantiser, at + 4, quantiser);
+            let holds = base != -32768 && base.wrapping_add((quantiser >> 16) as i32) <= 32_767;
+            sound &= check.ensure(holds, Rule::AtomQuantiser, at.wrapping_add(4), quantiser);
             if check.stopped {
                 return false;
             }
@@ -319,25 +331,29 @@ pub(crate) fn check_coefficients(
         return None;
     }
     let along = |size: u32| level_size(size, level).div_ceil(header.edge.max(1));
-    let blocks = along(header.width) * along(header.height);
-    let stated = check.word_at(offset + 4);
-    if !check.ensure(stated == blocks, Rule::CoefficientsHeader, offset + 4, stated) {
+    let blocks = along(header.width).wrapping_mul(along(header.height));
+    let stated = check.word_at(offset.wrapping_add(4));
+    if !check.ensure(stated == blocks, Rule::CoefficientsHeader, offset.wrapping_add(4), stated) {
         return None;
     }
-    let bits = check.word_at(offset + 8);
-    let expected = 16 + blocks as u64 * 4 + bits.div_ceil(32) as u64 * 4;
+    let bits = check.word_at(offset.wrapping_add(8));
+    let expected = (blocks as u64)
+        .wrapping_mul(4)
+        .wrapping_add(16)
+        .wrapping_add((bits.div_ceil(32) as u64).wrapping_mul(4));
     if !check.ensure(section.length as u64 == expected, Rule::CoefficientsLength, offset, section.length) {
         return None;
     }
-    let stream_offset = offset + 16 + blocks * 4;
-    let bytes = check.bytes.get(stream_offset as usize..(offset + section.length) as usize).unwrap_or(&[]);
-    let table = check.bytes.get((offset + 16) as usize..stream_offset as usize).unwrap_or(&[]);
+    let stream_offset = offset.wrapping_add(16).wrapping_add(blocks.wrapping_mul(4));
+    let bytes =
+        check.bytes.get(stream_offset as usize..offset.wrapping_add(section.length) as usize).unwrap_or(&[]);
+    let table = check.bytes.get(offset.wrapping_add(16) as usize..stream_offset as usize).unwrap_or(&[]);
     let stream = Stream { bytes, bits, value_bits, dictionary_bits, count_bits };
     let mut end = 0u32;
     let mut largest = 0;
     for (block, entry) in (0u32..).zip(table.as_chunks::<4>().0) {
         let bit = u32::from_le_bytes(*entry);
-        let at = offset + 16 + block * 4;
+        let at = offset.wrapping_add(16).wrapping_add(block.wrapping_mul(4));
         if !check.ensure(bit == end, Rule::RecordPlace, at, bit) {
             return None;
         }
@@ -345,14 +361,14 @@ pub(crate) fn check_coefficients(
         end = next;
         largest = largest.max(count);
     }
-    if !check.ensure(end == bits, Rule::RecordPlace, offset + 8, bits) {
+    if !check.ensure(end == bits, Rule::RecordPlace, offset.wrapping_add(8), bits) {
         return None;
     }
     // Fewer than 32 bits are left, all in the last word.
     let rest = if bits % 32 == 0 { 0 } else { window(bytes, bits) as u32 & (u32::MAX >> (bits % 32)) };
-    check.ensure(rest == 0, Rule::StreamEnd, offset + section.length - 4, rest);
-    let stated = check.word_at(offset + 12);
-    check.ensure(stated == largest, Rule::LargestCount, offset + 12, stated);
+    check.ensure(rest == 0, Rule::StreamEnd, offset.wrapping_add(section.length).wrapping_sub(4), rest);
+    let stated = check.word_at(offset.wrapping_add(12));
+    check.ensure(stated == largest, Rule::LargestCount, offset.wrapping_add(12), stated);
     Some(largest)
 }
 
@@ -365,19 +381,19 @@ fn check_record(
     stream_offset: u32,
     atoms: Section,
 ) -> Option<(u32, u32)> {
-    let at = stream_offset + (bit >> 5) * 4;
+    let at = stream_offset.wrapping_add((bit >> 5).wrapping_mul(4));
     let head = window(stream.bytes, bit);
-    let mask = |bits: u32| (1u64 << bits) - 1;
+    let mask = |bits: u32| (1u64 << bits).wrapping_sub(1);
     let count = (head & mask(stream.count_bits)) as u32;
     let dictionary = (head >> stream.count_bits & mask(stream.dictionary_bits)) as u32;
-    let after = stream.count_bits + stream.dictionary_bits;
+    let after = stream.count_bits.wrapping_add(stream.dictionary_bits);
     let shift = (head >> after & mask(SHIFT_BITS)) as u32;
-    let low_bits = (head >> (after + SHIFT_BITS) & mask(LOW_BITS_BITS)) as u32;
-    let header_bits = after + SHIFT_BITS + LOW_BITS_BITS;
-    let field_bits = low_bits + stream.value_bits;
-    let fields = bit as u64 + header_bits as u64;
-    let highs = fields + count as u64 * field_bits as u64;
-    if !check.ensure(highs + count as u64 <= stream.bits as u64, Rule::RecordPlace, at, bit) {
+    let low_bits = (head >> after.wrapping_add(SHIFT_BITS) & mask(LOW_BITS_BITS)) as u32;
+    let header_bits = after.wrapping_add(SHIFT_BITS).wrapping_add(LOW_BITS_BITS);
+    let field_bits = low_bits.wrapping_add(stream.value_bits);
+    let fields = (bit as u64).wrapping_add(header_bits as u64);
+    let highs = fields.wrapping_add((count as u64).wrapping_mul(field_bits as u64));
+    if !check.ensure(highs.wrapping_add(count as u64) <= stream.bits as u64, Rule::RecordPlace, at, bit) {
         return None;
     }
     if count == 0 {
@@ -389,9 +405,10 @@ fn check_record(
     if !check.ensure(good, Rule::RecordHeader, at, head as u32) {
         return None;
     }
-    let entry = atoms.offset + 8 + dictionary * 8;
-    let (atom_count, atom_start) = (check.word_at(entry), check.word_at(entry + 4));
-    let list = check.bytes.get((atoms.offset + atom_start * 4) as usize..).unwrap_or(&[]);
+    let entry = atoms.offset.wrapping_add(8).wrapping_add(dictionary.wrapping_mul(8));
+    let (atom_count, atom_start) = (check.word_at(entry), check.word_at(entry.wrapping_add(4)));
+    let list =
+        check.bytes.get(atoms.offset.wrapping_add(atom_start.wrapping_mul(4)) as usize..).unwrap_or(&[]);
     let list = list.as_chunks::<8>().0;
     let list = list.get(..atom_count as usize).unwrap_or(&[]);
 
@@ -415,8 +432,8 @@ fn check_record(
     }
     let (sum, end) = (scan.sum, scan.end);
     // Zeros cost time and no multiplication, so their number is bounded by that of the coefficients.
-    let zeros = end - highs as u32 - count;
-    if !check.ensure(zeros <= 32 * count + 32, Rule::RecordZeros, at, zeros) {
+    let zeros = end.wrapping_sub(highs as u32).wrapping_sub(count);
+    if !check.ensure(zeros <= count.wrapping_mul(32).wrapping_add(32), Rule::RecordZeros, at, zeros) {
         return None;
     }
     check.ensure(sum <= SUM_LIMIT, Rule::RecordSum, at, sum);
@@ -452,8 +469,8 @@ struct Scan {
 #[inline(never)]
 fn scan_record(bytes: &[u8], list: &[[u8; 8]], layout: Layout) -> Scan {
     let Layout { value_bits, low_bits, count, fields, highs, end } = layout;
-    let low_mask = (1u32 << low_bits) - 1;
-    let value_mask = (1u32 << value_bits) - 1;
+    let low_mask = (1u32 << low_bits).wrapping_sub(1);
+    let value_mask = (1u32 << value_bits).wrapping_sub(1);
     let half = (1u32 << value_bits) >> 1;
     let mut field_bit = fields;
     let mut ones = Ones::new(bytes, highs, end);
@@ -462,10 +479,10 @@ fn scan_record(bytes: &[u8], list: &[[u8; 8]], layout: Layout) -> Scan {
     let mut next = 0i64;
     while count_so_far < count {
         let Some(place) = ones.take() else { break };
-        last = place + 1;
-        let high = place - highs - count_so_far;
+        last = place.wrapping_add(1);
+        let high = place.wrapping_sub(highs).wrapping_sub(count_so_far);
         let field = window(bytes, field_bit) as u32;
-        field_bit += low_bits + value_bits;
+        field_bit = field_bit.wrapping_add(low_bits.wrapping_add(value_bits));
         // 64 bits: a high part beyond all atoms must not wrap back to one.
         let position = (high as u64) << low_bits | (field & low_mask) as u64;
         let Some(&[a, _, _, _, b0, b1, s0, s1]) = usize::try_from(position).ok().and_then(|at| list.get(at))
@@ -474,15 +491,16 @@ fn scan_record(bytes: &[u8], list: &[[u8; 8]], layout: Layout) -> Scan {
             break;
         };
         // Negative if a position does not ascend; looked at once, at the end.
-        order |= position as i64 - next;
-        next = position as i64 + 1;
+        order |= (position as i64).wrapping_sub(next);
+        next = (position as i64).wrapping_add(1);
         let step = u16::from_le_bytes([s0, s1]) as u32;
         let value = (field >> low_bits) & value_mask;
-        let coefficient = i16::from_le_bytes([b0, b1]) as i32 + ((value * step + half) >> value_bits) as i32;
+        let coefficient = (i16::from_le_bytes([b0, b1]) as i32)
+            .wrapping_add((value.wrapping_mul(step).wrapping_add(half) >> value_bits) as i32);
         // The floor of the negative magnitude is the ceiling of the magnitude, negated.
-        let negative = coefficient.min(-coefficient);
-        sum -= negative >> atom_shift(a as u32);
-        count_so_far += 1;
+        let negative = coefficient.min(coefficient.wrapping_neg());
+        sum = sum.wrapping_sub(negative >> atom_shift(a as u32));
+        count_so_far = count_so_far.wrapping_add(1);
     }
     Scan { count: count_so_far, end: last, sum: sum as u32, ascends: order >= 0, beyond }
 }

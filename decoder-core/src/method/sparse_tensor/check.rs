@@ -1,4 +1,5 @@
 //! Checks of the sparse tensor's sections (chapter 12).
+#![deny(clippy::arithmetic_side_effects)]
 
 use crate::container::directory::find_section;
 use crate::container::header::Header;
@@ -101,7 +102,9 @@ pub(crate) fn check_material(
         for layer in 0..header.layer_count {
             let section = find_section(check, header, LISTS, layer_instance(level, layer, 0))?;
             match check_lists(check, section, header, level, atoms) {
-                Some(largest) => at_level += layer_operations(largest, atoms.count, atoms.entries),
+                Some(largest) => {
+                    at_level = at_level.wrapping_add(layer_operations(largest, atoms.count, atoms.entries))
+                }
                 None => sound = false,
             }
             if check.stopped {
@@ -117,7 +120,7 @@ pub(crate) fn check_material(
 fn atoms_of(check: &Check<'_, '_>, header: &Header) -> Option<Atoms> {
     let light = find_section(check, header, LIGHT_ATOMS, 0)?;
     let fibres = find_section(check, header, FIBRES, 0)?;
-    let entries = check.word_at(fibres.offset + 4) & 0xff;
+    let entries = check.word_at(fibres.offset.wrapping_add(4)) & 0xff;
     Some(Atoms {
         light_start: check.section_start(light),
         fibres_start: check.section_start(fibres),
@@ -140,14 +143,14 @@ fn check_light_atoms(check: &mut Check<'_, '_>, header: &Header) -> Option<u32> 
     if !check.ensure(section.length >= 8, Rule::LightAtomsLength, offset, section.length) {
         return None;
     }
-    let (count, reserved) = (check.word_at(offset), check.word_at(offset + 4));
+    let (count, reserved) = (check.word_at(offset), check.word_at(offset.wrapping_add(4)));
     let counted =
         check.ensure((1..=LIGHT_ATOM_LIMIT).contains(&count), Rule::LightAtomsCounts, offset, count);
-    check.ensure(reserved == 0, Rule::LightAtomsCounts, offset + 4, reserved);
+    check.ensure(reserved == 0, Rule::LightAtomsCounts, offset.wrapping_add(4), reserved);
     // At most 8 + 4 * 1024 * 256 bytes.
     if !counted
         || !check.ensure(
-            section.length == 8 + 4 * header.light_count * count,
+            section.length == header.light_count.wrapping_mul(4).wrapping_mul(count).wrapping_add(8),
             Rule::LightAtomsLength,
             offset,
             section.length,
@@ -157,12 +160,17 @@ fn check_light_atoms(check: &mut Check<'_, '_>, header: &Header) -> Option<u32> 
     }
     let mut unused = 0xc000_0000u32;
     for c in (0..3).filter(|&c| !header.is_full(c)) {
-        unused |= 0x3ff << (c * 10);
+        unused |= 0x3ff << c.wrapping_mul(10);
     }
     let rows = check.section_bytes(section).get(8..).unwrap_or(&[]);
     for (n, entry) in (0u32..).zip(rows.as_chunks::<4>().0) {
         let entry = u32::from_le_bytes(*entry);
-        check.ensure(entry & unused == 0, Rule::LightAtomsEntry, offset + 8 + n * 4, entry);
+        check.ensure(
+            entry & unused == 0,
+            Rule::LightAtomsEntry,
+            offset.wrapping_add(8).wrapping_add(n.wrapping_mul(4)),
+            entry,
+        );
         if check.stopped {
             return None;
         }
@@ -177,32 +185,36 @@ fn check_fibres(check: &mut Check<'_, '_>, header: &Header, light_atoms: u32) ->
     if !check.ensure(section.length >= 8, Rule::FibresLength, offset, section.length) {
         return None;
     }
-    let (count, shape) = (check.word_at(offset), check.word_at(offset + 4));
+    let (count, shape) = (check.word_at(offset), check.word_at(offset.wrapping_add(4)));
     let (entries, index_bits) = (shape & 0xff, shape >> 8);
     let counted = check.ensure((1..=ATOM_LIMIT).contains(&count), Rule::FibresShape, offset, count);
-    let shaped = (1..=FIBRE_LIMIT).contains(&entries) && index_bits == bit_length(light_atoms - 1);
-    if !check.ensure(shaped, Rule::FibresShape, offset + 4, shape) || !counted {
+    let shaped =
+        (1..=FIBRE_LIMIT).contains(&entries) && index_bits == bit_length(light_atoms.wrapping_sub(1));
+    if !check.ensure(shaped, Rule::FibresShape, offset.wrapping_add(4), shape) || !counted {
         return None;
     }
     // At most 2^25 entries.
-    let total = header.view_count * count * entries;
-    let expected = 8 + 4 * count as u64 + 4 * total.div_ceil(2) as u64;
+    let total = header.view_count.wrapping_mul(count).wrapping_mul(entries);
+    let expected = (count as u64)
+        .wrapping_mul(4)
+        .wrapping_add(8)
+        .wrapping_add((total.div_ceil(2) as u64).wrapping_mul(4));
     if !check.ensure(section.length as u64 == expected, Rule::FibresLength, offset, section.length) {
         return None;
     }
     for n in 0..count {
-        let at = offset + 8 + n * 4;
+        let at = offset.wrapping_add(8).wrapping_add(n.wrapping_mul(4));
         let shifts = check.word_at(at);
         check.ensure(shifts >> 10 == 0, Rule::FibresShifts, at, shifts);
         if check.stopped {
             return None;
         }
     }
-    let table = offset + 8 + count * 4;
-    let bytes = check.bytes.get(table as usize..(offset + section.length) as usize).unwrap_or(&[]);
+    let table = offset.wrapping_add(8).wrapping_add(count.wrapping_mul(4));
+    let bytes = check.bytes.get(table as usize..offset.wrapping_add(section.length) as usize).unwrap_or(&[]);
     let mut halves = bytes.as_chunks::<2>().0.iter();
-    let index_mask = (1u16 << index_bits) - 1;
-    for fibre in 0..header.view_count * count {
+    let index_mask = (1u16 << index_bits).wrapping_sub(1);
+    for fibre in 0..header.view_count.wrapping_mul(count) {
         let mut sum = 0u32;
         for n in 0..entries {
             let Some(half) = halves.next() else { break };
@@ -211,19 +223,24 @@ fn check_fibres(check: &mut Check<'_, '_>, header: &Header, light_atoms: u32) ->
             check.ensure(
                 (index as u32) < light_atoms,
                 Rule::FibreIndex,
-                table + (fibre * entries + n) * 2,
+                table.wrapping_add(fibre.wrapping_mul(entries).wrapping_add(n).wrapping_mul(2)),
                 entry as u32,
             );
-            sum += ((entry - index) as i16).unsigned_abs() as u32;
+            sum = sum.wrapping_add((entry.wrapping_sub(index) as i16).unsigned_abs() as u32);
         }
-        check.ensure(sum <= FIBRE_SUM_LIMIT, Rule::FibreSum, table + fibre * entries * 2, sum);
+        check.ensure(
+            sum <= FIBRE_SUM_LIMIT,
+            Rule::FibreSum,
+            table.wrapping_add(fibre.wrapping_mul(entries).wrapping_mul(2)),
+            sum,
+        );
         if check.stopped {
             return None;
         }
     }
     if let Some(half) = halves.next() {
         let unused = u16::from_le_bytes(*half) as u32;
-        check.ensure(unused == 0, Rule::FibreIndex, table + total * 2, unused);
+        check.ensure(unused == 0, Rule::FibreIndex, table.wrapping_add(total.wrapping_mul(2)), unused);
     }
     if check.stopped { None } else { Some(()) }
 }
@@ -256,41 +273,55 @@ fn check_lists(
     let in_range = (1..=VALUE_BITS_LIMIT).contains(&value_bits)
         && (1..=COUNT_BITS_LIMIT).contains(&count_bits)
         && shift <= 31;
-    if !check.ensure(in_range && index_bits == bit_length(atoms.count - 1), Rule::ListsHeader, offset, head) {
+    if !check.ensure(
+        in_range && index_bits == bit_length(atoms.count.wrapping_sub(1)),
+        Rule::ListsHeader,
+        offset,
+        head,
+    ) {
         return None;
     }
-    let texels = level_size(header.width, level) * level_size(header.height, level);
-    let stated = check.word_at(offset + 4);
-    if !check.ensure(stated == texels, Rule::ListsHeader, offset + 4, stated) {
+    let texels = level_size(header.width, level).wrapping_mul(level_size(header.height, level));
+    let stated = check.word_at(offset.wrapping_add(4));
+    if !check.ensure(stated == texels, Rule::ListsHeader, offset.wrapping_add(4), stated) {
         return None;
     }
     let groups = texels.div_ceil(GROUP_TEXELS);
-    let bits = check.word_at(offset + 8);
-    let expected = 16 + 4 * groups as u64 + 4 * bits.div_ceil(32) as u64;
+    let bits = check.word_at(offset.wrapping_add(8));
+    let expected = (groups as u64)
+        .wrapping_mul(4)
+        .wrapping_add(16)
+        .wrapping_add((bits.div_ceil(32) as u64).wrapping_mul(4));
     if !check.ensure(section.length as u64 == expected, Rule::ListsLength, offset, section.length) {
         return None;
     }
-    let stream_offset = offset + 16 + groups * 4;
-    let bytes = check.bytes.get(stream_offset as usize..(offset + section.length) as usize).unwrap_or(&[]);
-    let table = check.bytes.get((offset + 16) as usize..stream_offset as usize).unwrap_or(&[]);
+    let stream_offset = offset.wrapping_add(16).wrapping_add(groups.wrapping_mul(4));
+    let bytes =
+        check.bytes.get(stream_offset as usize..offset.wrapping_add(section.length) as usize).unwrap_or(&[]);
+    let table = check.bytes.get(offset.wrapping_add(16) as usize..stream_offset as usize).unwrap_or(&[]);
     let stream = Stream { bytes, offset: stream_offset, bits, value_bits, count_bits, index_bits };
     let (mut end, mut largest) = (0u32, 0);
     for (group, entry) in (0u32..).zip(table.as_chunks::<4>().0) {
         let stated = u32::from_le_bytes(*entry);
-        if !check.ensure(stated == end, Rule::ListPlace, offset + 16 + group * 4, stated) {
+        if !check.ensure(
+            stated == end,
+            Rule::ListPlace,
+            offset.wrapping_add(16).wrapping_add(group.wrapping_mul(4)),
+            stated,
+        ) {
             return None;
         }
-        let left = texels - group * GROUP_TEXELS;
+        let left = texels.wrapping_sub(group.wrapping_mul(GROUP_TEXELS));
         (end, largest) = check_group(check, &stream, stated, left, atoms, largest)?;
     }
-    if !check.ensure(end == bits, Rule::ListPlace, offset + 8, bits) {
+    if !check.ensure(end == bits, Rule::ListPlace, offset.wrapping_add(8), bits) {
         return None;
     }
     // Fewer than 32 bits are left, all in the last word.
     let rest = if bits % 32 == 0 { 0 } else { window(bytes, bits) as u32 & (u32::MAX >> (bits % 32)) };
-    check.ensure(rest == 0, Rule::ListsEnd, offset + section.length - 4, rest);
-    let stated = check.word_at(offset + 12);
-    check.ensure(stated == largest, Rule::ListsLargest, offset + 12, stated);
+    check.ensure(rest == 0, Rule::ListsEnd, offset.wrapping_add(section.length).wrapping_sub(4), rest);
+    let stated = check.word_at(offset.wrapping_add(12));
+    check.ensure(stated == largest, Rule::ListsLargest, offset.wrapping_add(12), stated);
     Some(largest)
 }
 
@@ -304,21 +335,31 @@ fn check_group(
     atoms: Atoms,
     mut largest: u32,
 ) -> Option<(u32, u32)> {
-    let place = |bit: u32| stream.offset + (bit >> 5) * 4;
-    let heads = stream.count_bits * GROUP_TEXELS;
-    if !check.ensure(first as u64 + heads as u64 <= stream.bits as u64, Rule::ListPlace, place(first), first)
-    {
+    let place = |bit: u32| stream.offset.wrapping_add((bit >> 5).wrapping_mul(4));
+    let heads = stream.count_bits.wrapping_mul(GROUP_TEXELS);
+    if !check.ensure(
+        (first as u64).wrapping_add(heads as u64) <= stream.bits as u64,
+        Rule::ListPlace,
+        place(first),
+        first,
+    ) {
         return None;
     }
     let counts = window(stream.bytes, first);
-    let mut bit = first + heads;
+    let mut bit = first.wrapping_add(heads);
     for n in 0..GROUP_TEXELS {
-        let count = (counts >> (n * stream.count_bits)) as u32 & ((1 << stream.count_bits) - 1);
+        let count = (counts >> n.wrapping_mul(stream.count_bits)) as u32
+            & (1u32 << stream.count_bits).wrapping_sub(1);
         if !check.ensure(count == 0 || n < left, Rule::ListOutside, place(first), count) {
             return None;
         }
         let length = list_bits(stream.index_bits, stream.value_bits, atoms.count, count);
-        if !check.ensure(bit as u64 + length as u64 <= stream.bits as u64, Rule::ListPlace, place(bit), bit) {
+        if !check.ensure(
+            (bit as u64).wrapping_add(length as u64) <= stream.bits as u64,
+            Rule::ListPlace,
+            place(bit),
+            bit,
+        ) {
             return None;
         }
         if count > 0 {
@@ -327,7 +368,7 @@ fn check_group(
         if check.stopped {
             return None;
         }
-        bit += length;
+        bit = bit.wrapping_add(length);
         largest = largest.max(count);
     }
     Some((bit, largest))
@@ -342,24 +383,27 @@ fn check_list(
     length: u32,
     atoms: Atoms,
 ) {
-    let at = stream.offset + (bit >> 5) * 4;
+    let at = stream.offset.wrapping_add((bit >> 5).wrapping_mul(4));
     let low_bits = list_low_bits(stream.index_bits, count);
-    let field_bits = low_bits + stream.value_bits;
-    let highs = bit + count * field_bits;
-    let mut ones = Ones::new(stream.bytes, highs, bit + length);
+    let field_bits = low_bits.wrapping_add(stream.value_bits);
+    let highs = bit.wrapping_add(count.wrapping_mul(field_bits));
+    let mut ones = Ones::new(stream.bytes, highs, bit.wrapping_add(length));
     let (mut seen, mut next, mut sum, mut sound) = (0u32, 0u32, 0u32, true);
     while let Some(place) = ones.take() {
         if seen < count {
-            let field = window(stream.bytes, bit + seen * field_bits) as u32;
-            let index = (place - highs - seen) << low_bits | low_part(field, low_bits);
+            let field = window(stream.bytes, bit.wrapping_add(seen.wrapping_mul(field_bits))) as u32;
+            let index = place.wrapping_sub(highs).wrapping_sub(seen) << low_bits | low_part(field, low_bits);
             sound &= index >= next && index < atoms.count;
-            next = index + 1;
+            next = index.wrapping_add(1);
             let coefficient =
                 list_coefficient(low_part(field >> low_bits, stream.value_bits), stream.value_bits);
-            let shifts = word(check.words, atoms.fibres_start + 2 + index.min(atoms.count - 1));
-            sum += coefficient.unsigned_abs().div_ceil(1 << gain_shift(shifts));
+            let shifts = word(
+                check.words,
+                atoms.fibres_start.wrapping_add(2).wrapping_add(index.min(atoms.count.wrapping_sub(1))),
+            );
+            sum = sum.wrapping_add(coefficient.unsigned_abs().div_ceil(1 << gain_shift(shifts)));
         }
-        seen += 1;
+        seen = seen.wrapping_add(1);
     }
     if check.ensure(sound && seen == count, Rule::ListIndices, at, bit) {
         check.ensure(sum <= LIST_SUM_LIMIT, Rule::ListSum, at, sum);
