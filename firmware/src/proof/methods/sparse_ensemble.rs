@@ -2,7 +2,7 @@
 
 use crate::{any, i, n};
 use core::hint::black_box;
-use selvedge::kernel::sparse_ensemble::{self, cost};
+use selvedge::method::sparse_ensemble::{self, cost};
 use selvedge::kernel::{material, position, words};
 use selvedge::{Located, Taps};
 
