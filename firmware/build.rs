@@ -54,6 +54,8 @@ fn main() {
     let out = std::env::var("OUT_DIR").expect("set by cargo");
     std::fs::write(Path::new(&out).join("table.rs"), table).expect("the table is written");
 
+    write_methods(&root, Path::new(&out));
+
     let target = std::env::var("TARGET").expect("set by cargo");
     let script = if target.starts_with("thumb") {
         Some("cortex-m.ld")
@@ -68,4 +70,22 @@ fn main() {
     } else if !target.starts_with("wasm") {
         println!("cargo:rustc-link-arg-bins=-e_start");
     }
+}
+
+/// A module for each file of `proof/methods`, and a function that calls them all.
+fn write_methods(root: &Path, out: &Path) {
+    let folder = root.join("src/proof/methods");
+    println!("cargo:rerun-if-changed={}", folder.display());
+    let entries = std::fs::read_dir(&folder).expect("a folder").flatten();
+    let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
+    files.sort();
+    let (mut text, mut calls) = (String::new(), String::new());
+    for file in files {
+        let name = file.file_stem().expect("a name").to_string_lossy().into_owned();
+        writeln!(text, "#[path = {file:?}]\nmod {name};").expect("text");
+        writeln!(calls, "    {name}::call(files);").expect("text");
+    }
+    write!(text, "/// Every method's functions.\nfn call_methods(files: Words<'_>) {{\n{calls}}}\n")
+        .expect("text");
+    std::fs::write(out.join("methods.rs"), text).expect("the list is written");
 }

@@ -141,8 +141,10 @@ done
 
 if [ -z "$quick" ] && [ -n "$objdump" ]; then
     { echo; echo "## Code and stack"; echo; echo "Bytes of code and constants on \`thumbv7m-none-eabi\`, with one method alone: the whole program with \`open\` and every check, what sampling reaches, what \`open\` reaches."; echo; echo "| method | optimised for | whole | sampling | \`open\` |"; echo "|---|---|---:|---:|---:|"; } >> $results
-    for method in sparse-ensemble sparse-tensor; do for opt in s z 2; do
-        program=$(build thumbv7m-none-eabi "$opt" size --no-default-features --features $method)
+    # The methods are those that the core lists.
+    methods=$(sed -n 's/^all-methods = \[\(.*\)\]/\1/p' ../decoder-core/Cargo.toml | tr -d '",')
+    for method in $methods; do for opt in s z 2; do
+        program=$(build thumbv7m-none-eabi "$opt" size --no-default-features --features "selvedge/$method")
         echo "| $method | $opt | $(text_of "$program") | $(python3 reachable.py "$program" sample_material "$objdump" | cut -d' ' -f1) | $(python3 reachable.py "$program" open_material "$objdump" | cut -d' ' -f1) |" >> $results
     done; done
     { echo; echo "Measured in the emulator (Cortex-M3, optimised for size):"; echo; echo '```'; echo "$m3" | grep -E 'stack|instructions'; echo '```'; } >> $results

@@ -10,7 +10,7 @@ import ctypes
 import sys
 from ctypes import POINTER, Structure, byref, c_char_p, c_float, c_int32, c_size_t, c_uint8, c_uint32, c_uint64, c_void_p
 
-ABI_VERSION = 1
+ABI_VERSION = 2
 BAD_USAGE, BAD_IO, NULL_POINTER = 1, 2, 16
 
 

@@ -38,7 +38,7 @@ extern "C" {
 #endif
 
 /* Version of the interface that this header describes; compare with selvedge_abi_version(). */
-#define SELVEDGE_ABI_VERSION 1
+#define SELVEDGE_ABI_VERSION 2
 /* 64-bit words of a material. */
 #define SELVEDGE_MATERIAL_WORDS 64
 /* Bytes of a decode digest. */
@@ -124,7 +124,7 @@ typedef struct selvedge_header {
     uint32_t minor_version;
     uint32_t file_length; /* bytes */
     uint32_t content;     /* 0: a material */
-    uint32_t method;      /* 1: the sparse ensemble, 2: the sparse tensor */
+    uint32_t method;      /* number of the method; chapter 3.1 of the specification */
     uint32_t section_count;
     uint32_t operations;         /* 32-bit multiplications of a filtered sample, at worst */
     uint32_t width;              /* texels along x, 1 to 16384 */
@@ -169,7 +169,7 @@ typedef struct selvedge_direction {
     int32_t z_q15; /* z, 0 at and below the horizon to SELVEDGE_ONE_Q15 */
 } selvedge_direction;
 
-/* A located direction: three sample directions and their weights. Locate once, use for many texels. */
+/* Three sample directions and their weights. */
 typedef struct selvedge_taps {
     uint32_t a;
     uint32_t b;
@@ -179,6 +179,14 @@ typedef struct selvedge_taps {
     int32_t weight_c_q15;
     int32_t cosine_q15; /* cosine asked for over cosine sampled: one within the hull of the samples, less beyond */
 } selvedge_taps;
+
+/* A direction located among the sample directions of a material. Locate once, use for many texels. */
+typedef struct selvedge_located {
+    selvedge_direction direction; /* the direction asked for, every part clamped to its range */
+    int32_t clamped_x_q18;        /* its point, moved onto the hull of the samples where it lies beyond */
+    int32_t clamped_y_q18;
+    selvedge_taps taps;
+} selvedge_located;
 
 /* Values of the three channels, Q20: -2^27 to 2^27. */
 typedef struct selvedge_values {
@@ -307,9 +315,9 @@ selvedge_status selvedge_query_from_floats(const float *position, const float *l
 selvedge_status selvedge_light_direction(const selvedge_material *material, uint32_t index, selvedge_direction *out);
 selvedge_status selvedge_view_direction(const selvedge_material *material, uint32_t index, selvedge_direction *out);
 
-/* The taps of a direction among the sample directions of the light, or of the view. */
-selvedge_status selvedge_locate_light(const selvedge_material *material, const selvedge_direction *direction, selvedge_taps *out);
-selvedge_status selvedge_locate_view(const selvedge_material *material, const selvedge_direction *direction, selvedge_taps *out);
+/* Locates a direction among the sample directions of the light, or of the view. */
+selvedge_status selvedge_locate_light(const selvedge_material *material, const selvedge_direction *direction, selvedge_located *out);
+selvedge_status selvedge_locate_view(const selvedge_material *material, const selvedge_direction *direction, selvedge_located *out);
 
 /* ---- Samples: linear radiance ---- */
 
@@ -331,21 +339,21 @@ selvedge_status selvedge_sample_trilinear(const selvedge_material *material, uin
 
 /* ---- Samples: channel values, before colour and transfer ----
  *
- * Taps are those that selvedge_locate_light and selvedge_locate_view give of the same material; any others are safe, and
+ * Located directions are those that selvedge_locate_light and selvedge_locate_view give of the same material; any others are safe, and
  * give values without meaning.
  */
 
 selvedge_status selvedge_point_values(const selvedge_material *material, uint32_t texel_x, uint32_t texel_y, uint32_t light_index,
                                       uint32_t view_index, selvedge_values *out);
-selvedge_status selvedge_texel_values(const selvedge_material *material, uint32_t texel_x, uint32_t texel_y, const selvedge_taps *light,
-                                      const selvedge_taps *view, selvedge_values *out);
-selvedge_status selvedge_filtered_values(const selvedge_material *material, uint32_t u_q32, uint32_t v_q32, const selvedge_taps *light,
-                                         const selvedge_taps *view, selvedge_values *out);
+selvedge_status selvedge_texel_values(const selvedge_material *material, uint32_t texel_x, uint32_t texel_y, const selvedge_located *light,
+                                      const selvedge_located *view, selvedge_values *out);
+selvedge_status selvedge_filtered_values(const selvedge_material *material, uint32_t u_q32, uint32_t v_q32, const selvedge_located *light,
+                                         const selvedge_located *view, selvedge_values *out);
 selvedge_status selvedge_trilinear_values(const selvedge_material *material, uint32_t level_q16, uint32_t u_q32, uint32_t v_q32,
-                                          const selvedge_taps *light, const selvedge_taps *view, selvedge_values *out);
+                                          const selvedge_located *light, const selvedge_located *view, selvedge_values *out);
 
 /* Channel values to linear radiance under a located light. */
-selvedge_status selvedge_radiance(const selvedge_material *material, const selvedge_values *values, const selvedge_taps *light, selvedge_rgb *out);
+selvedge_status selvedge_radiance(const selvedge_material *material, const selvedge_values *values, const selvedge_located *light, selvedge_rgb *out);
 
 /* ---- Many at once: the same bits, faster ----
  *

@@ -5,13 +5,14 @@
 
 use crate::lent::{Checked, read, read_material, status, write};
 use crate::types::{
-    SELVEDGE_DIGEST_LENGTH, selvedge_direction, selvedge_material, selvedge_query, selvedge_rgb,
-    selvedge_status, selvedge_taps, selvedge_values,
+    SELVEDGE_DIGEST_LENGTH, selvedge_direction, selvedge_located, selvedge_material, selvedge_query,
+    selvedge_rgb, selvedge_status, selvedge_values,
 };
-use selvedge::direction::direction_from_binary32;
-use selvedge::interpolation::{radiance, texel_values, trilinear_values};
-use selvedge::position::fraction_from_binary32;
-use selvedge::{Direction, FilteredQuery, Selvedge, Taps};
+use selvedge::kernel::direction::direction_from_binary32;
+use selvedge::kernel::interpolation::{radiance, texel_values};
+use selvedge::kernel::levels::trilinear_values;
+use selvedge::kernel::position::fraction_from_binary32;
+use selvedge::{Direction, FilteredQuery, Located, Selvedge};
 
 /// Reads an open material, computes, and writes one result.
 ///
@@ -127,7 +128,7 @@ pub unsafe extern "C" fn selvedge_view_direction(
     unsafe { answer(material, out, |selvedge| Ok(selvedge.view_direction(index))) }
 }
 
-/// The taps of a light direction: [`Selvedge::locate_light`].
+/// A light direction, located: [`Selvedge::locate_light`].
 ///
 /// # Safety
 /// As the header says of pointers and of materials.
@@ -135,17 +136,17 @@ pub unsafe extern "C" fn selvedge_view_direction(
 pub unsafe extern "C" fn selvedge_locate_light(
     material: *const selvedge_material,
     direction: *const selvedge_direction,
-    out: *mut selvedge_taps,
+    out: *mut selvedge_located,
 ) -> selvedge_status {
-    // SAFETY: the caller's promise is that of `read`.
     let compute = |selvedge: &Selvedge<'_>| {
+        // SAFETY: the caller's promise is that of `read`.
         unsafe { read(direction) }.map(|direction| selvedge.locate_light(direction))
     };
     // SAFETY: the caller's promise is that of `answer`.
     unsafe { answer(material, out, compute) }
 }
 
-/// The taps of a view direction: [`Selvedge::locate_view`].
+/// A view direction, located: [`Selvedge::locate_view`].
 ///
 /// # Safety
 /// As the header says of pointers and of materials.
@@ -153,7 +154,7 @@ pub unsafe extern "C" fn selvedge_locate_light(
 pub unsafe extern "C" fn selvedge_locate_view(
     material: *const selvedge_material,
     direction: *const selvedge_direction,
-    out: *mut selvedge_taps,
+    out: *mut selvedge_located,
 ) -> selvedge_status {
     // SAFETY: the caller's promise is that of `read`.
     let compute =
@@ -207,14 +208,14 @@ pub unsafe extern "C" fn selvedge_texel_values(
     material: *const selvedge_material,
     texel_x: u32,
     texel_y: u32,
-    light: *const selvedge_taps,
-    view: *const selvedge_taps,
+    light: *const selvedge_located,
+    view: *const selvedge_located,
     out: *mut selvedge_values,
 ) -> selvedge_status {
     let compute = |selvedge: &Selvedge<'_>| {
         // SAFETY: the caller's promise is that of `read`.
         let (light, view) = unsafe { read_both(light, view) }?;
-        Ok(texel_values(selvedge.words(), selvedge.material(), texel_x, texel_y, light, view))
+        Ok(texel_values(selvedge.words(), selvedge.material(), texel_x, texel_y, &light, &view))
     };
     // SAFETY: the caller's promise is that of `answer`.
     unsafe { answer(material, out, compute) }
@@ -237,8 +238,8 @@ pub unsafe extern "C" fn selvedge_sample_texel(
         // SAFETY: the caller's promise is that of `read`.
         let (light, view) = unsafe { read_both(light, view) }?;
         let (light, view) = (selvedge.locate_light(light), selvedge.locate_view(view));
-        let values = texel_values(selvedge.words(), selvedge.material(), texel_x, texel_y, light, view);
-        Ok(radiance(selvedge.material(), values, light))
+        let values = texel_values(selvedge.words(), selvedge.material(), texel_x, texel_y, &light, &view);
+        Ok(radiance(selvedge.material(), values, &light))
     };
     // SAFETY: the caller's promise is that of `answer`.
     unsafe { answer(material, out, compute) }
@@ -275,14 +276,14 @@ pub unsafe extern "C" fn selvedge_filtered_values(
     material: *const selvedge_material,
     u_q32: u32,
     v_q32: u32,
-    light: *const selvedge_taps,
-    view: *const selvedge_taps,
+    light: *const selvedge_located,
+    view: *const selvedge_located,
     out: *mut selvedge_values,
 ) -> selvedge_status {
     let compute = |selvedge: &Selvedge<'_>| {
         // SAFETY: the caller's promise is that of `read`.
         let (light, view) = unsafe { read_both(light, view) }?;
-        Ok(selvedge.filtered_values(u_q32, v_q32, light, view))
+        Ok(selvedge.filtered_values(u_q32, v_q32, &light, &view))
     };
     // SAFETY: the caller's promise is that of `answer`.
     unsafe { answer(material, out, compute) }
@@ -321,14 +322,14 @@ pub unsafe extern "C" fn selvedge_trilinear_values(
     level_q16: u32,
     u_q32: u32,
     v_q32: u32,
-    light: *const selvedge_taps,
-    view: *const selvedge_taps,
+    light: *const selvedge_located,
+    view: *const selvedge_located,
     out: *mut selvedge_values,
 ) -> selvedge_status {
     let compute = |selvedge: &Selvedge<'_>| {
         // SAFETY: the caller's promise is that of `read`.
         let (light, view) = unsafe { read_both(light, view) }?;
-        Ok(trilinear_values(selvedge.words(), selvedge.material(), level_q16, u_q32, v_q32, light, view))
+        Ok(trilinear_values(selvedge.words(), selvedge.material(), level_q16, u_q32, v_q32, &light, &view))
     };
     // SAFETY: the caller's promise is that of `answer`.
     unsafe { answer(material, out, compute) }
@@ -342,15 +343,15 @@ pub unsafe extern "C" fn selvedge_trilinear_values(
 pub unsafe extern "C" fn selvedge_radiance(
     material: *const selvedge_material,
     values: *const selvedge_values,
-    light: *const selvedge_taps,
+    light: *const selvedge_located,
     out: *mut selvedge_rgb,
 ) -> selvedge_status {
     let compute = |selvedge: &Selvedge<'_>| {
         // SAFETY: the caller's promise is that of `read`.
         let values = unsafe { read(values) }?;
         // SAFETY: the same.
-        let light: Taps = unsafe { read(light) }?;
-        Ok(radiance(selvedge.material(), values, light))
+        let light: Located = unsafe { read(light) }?;
+        Ok(radiance(selvedge.material(), values, &light))
     };
     // SAFETY: the caller's promise is that of `answer`.
     unsafe { answer(material, out, compute) }

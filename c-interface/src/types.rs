@@ -2,10 +2,10 @@
 
 use core::ffi::{c_char, c_void};
 use core::mem::{MaybeUninit, offset_of};
-use selvedge::{Direction, Family, FilteredQuery, Finding, Header, Limits, Part, Rgb, Taps, Values};
+use selvedge::{Direction, Family, FilteredQuery, Finding, Header, Limits, Located, Part, Rgb, Taps, Values};
 
 /// Version of this interface; another number is another interface.
-pub const SELVEDGE_ABI_VERSION: u32 = 1;
+pub const SELVEDGE_ABI_VERSION: u32 = 2;
 /// 64-bit words of a [`selvedge_material`].
 pub const SELVEDGE_MATERIAL_WORDS: usize = 64;
 /// Bytes of a decode digest.
@@ -65,6 +65,8 @@ pub type selvedge_status = i32;
 pub type selvedge_direction = Direction;
 /// [`Taps`].
 pub type selvedge_taps = Taps;
+/// [`Located`].
+pub type selvedge_located = Located;
 /// [`Values`].
 pub type selvedge_values = Values;
 /// [`Rgb`].
@@ -163,7 +165,7 @@ pub struct selvedge_header {
     pub file_length: u32,
     /// 0 for a material.
     pub content: u32,
-    /// 1 for the sparse ensemble, 2 for the sparse tensor.
+    /// Number of the method, by chapter 3.1 of the specification.
     pub method: u32,
     /// Entries of the directory.
     pub section_count: u32,
@@ -313,11 +315,14 @@ const _: () = {
 
 // Constants that are the core's.
 const _: () = {
-    assert!(SELVEDGE_CHANNEL_MISSING == selvedge::material::CHANNEL_MISSING);
-    assert!(SELVEDGE_CHANNEL_MEAN == selvedge::material::CHANNEL_MEAN);
-    assert!(SELVEDGE_CHANNEL_FULL == selvedge::material::CHANNEL_FULL);
-    assert!(SELVEDGE_TRANSFER_LOG2 == selvedge::material::TRANSFER_LOG2);
-    assert!(SELVEDGE_TRANSFER_LINEAR == selvedge::material::TRANSFER_LINEAR);
-    assert!(SELVEDGE_ONE_Q15 == selvedge::fixed::ONE_Q15 && SELVEDGE_ONE_Q18 == selvedge::direction::ONE_Q18);
+    assert!(SELVEDGE_CHANNEL_MISSING == selvedge::kernel::material::CHANNEL_MISSING);
+    assert!(SELVEDGE_CHANNEL_MEAN == selvedge::kernel::material::CHANNEL_MEAN);
+    assert!(SELVEDGE_CHANNEL_FULL == selvedge::kernel::material::CHANNEL_FULL);
+    assert!(SELVEDGE_TRANSFER_LOG2 == selvedge::kernel::material::TRANSFER_LOG2);
+    assert!(SELVEDGE_TRANSFER_LINEAR == selvedge::kernel::material::TRANSFER_LINEAR);
+    assert!(
+        SELVEDGE_ONE_Q15 == selvedge::kernel::fixed::ONE_Q15
+            && SELVEDGE_ONE_Q18 == selvedge::kernel::direction::ONE_Q18
+    );
     assert!(SELVEDGE_DIGEST_LENGTH == size_of::<selvedge::Digest>());
 };

@@ -3,9 +3,10 @@
 mod common;
 
 use common::{Numbers, broken_files, expected_print, fixture_bytes};
-use selvedge::interpolation::{radiance, texel_values, trilinear_values};
+use selvedge::kernel::interpolation::{radiance, texel_values};
+use selvedge::kernel::levels::trilinear_values;
 use selvedge::{
-    Direction, Family, FilteredQuery, Finding, Limits, Part, Rgb, Rule, Selvedge, Taps, Values, open,
+    Direction, Family, FilteredQuery, Finding, Limits, Located, Part, Rgb, Rule, Selvedge, Taps, Values, open,
 };
 use selvedge_c::*;
 use std::ffi::{CStr, c_char, c_void};
@@ -46,11 +47,13 @@ fn string(text: *const c_char) -> String {
     unsafe { CStr::from_ptr(text) }.to_str().expect("texts are ASCII").into()
 }
 
-/// Taps that no direction gives.
-fn wild_taps(numbers: &mut Numbers) -> Taps {
+/// A located direction that no direction gives.
+fn wild_located(numbers: &mut Numbers) -> Located {
     let [a, b, c] = [0; 3].map(|_| numbers.word());
     let [weight_a_q15, weight_b_q15, weight_c_q15, cosine_q15] = [0; 4].map(|_| numbers.word() as i32);
-    Taps { a, b, c, weight_a_q15, weight_b_q15, weight_c_q15, cosine_q15 }
+    let taps = Taps { a, b, c, weight_a_q15, weight_b_q15, weight_c_q15, cosine_q15 };
+    let [clamped_x_q18, clamped_y_q18, x_q18, y_q18, z_q15] = [0; 5].map(|_| numbers.word() as i32);
+    Located { direction: Direction { x_q18, y_q18, z_q15 }, clamped_x_q18, clamped_y_q18, taps }
 }
 
 /// Random queries of every function of single samples.
@@ -80,22 +83,22 @@ fn hold_samples(m: &selvedge_material, core: &Selvedge<'_>, numbers: &mut Number
             numbers.word(),
             if wild { numbers.word() } else { numbers.below(core.header().level_count << 16) },
         );
-        let texel = texel_values(core.words(), core.material(), x, y, lt, vt);
+        let texel = texel_values(core.words(), core.material(), x, y, &lt, &vt);
         assert_eq!(told(|o| c!(selvedge_texel_values(m, x, y, &lt, &vt, o))), texel);
         assert_eq!(
             told(|o| c!(selvedge_sample_texel(m, x, y, &light, &view, o))),
-            radiance(core.material(), texel, lt)
+            radiance(core.material(), texel, &lt)
         );
-        assert_eq!(told(|o| c!(selvedge_radiance(m, &texel, &lt, o))), radiance(core.material(), texel, lt));
+        assert_eq!(told(|o| c!(selvedge_radiance(m, &texel, &lt, o))), radiance(core.material(), texel, &lt));
         assert_eq!(
             told(|o| c!(selvedge_filtered_values(m, p, q, &lt, &vt, o))),
-            core.filtered_values(p, q, lt, vt)
+            core.filtered_values(p, q, &lt, &vt)
         );
         assert_eq!(
             told(|o| c!(selvedge_sample_filtered(m, p, q, &light, &view, o))),
             core.filtered(p, q, light, view)
         );
-        let between = trilinear_values(core.words(), core.material(), level, p, q, lt, vt);
+        let between = trilinear_values(core.words(), core.material(), level, p, q, &lt, &vt);
         assert_eq!(told(|o| c!(selvedge_trilinear_values(m, level, p, q, &lt, &vt, o))), between);
         assert_eq!(
             told(|o| c!(selvedge_sample_trilinear(m, level, p, q, &light, &view, o))),
@@ -165,29 +168,29 @@ fn the_suite_is_sampled_as_by_the_core() {
     assert!(materials > 25 && outside >= 2, "{materials} {outside}");
 }
 
-/// Any taps and values are safe, though they mean nothing.
+/// Any located directions and values are safe, though they mean nothing.
 #[test]
-fn wild_taps_are_safe() {
+fn wild_directions_are_safe() {
     let bytes = fixture_bytes();
     let core = open(&bytes, &Limits::default()).expect("the fixture is good");
     let m = open_in_c(&bytes);
     let mut numbers = Numbers::new(2);
     for _ in 0..2000 {
-        let (lt, vt) = (wild_taps(&mut numbers), wild_taps(&mut numbers));
+        let (lt, vt) = (wild_located(&mut numbers), wild_located(&mut numbers));
         let [x, y, level] = [0; 3].map(|_| numbers.word());
         assert_eq!(
             told(|o| c!(selvedge_filtered_values(&m, x, y, &lt, &vt, o))),
-            core.filtered_values(x, y, lt, vt)
+            core.filtered_values(x, y, &lt, &vt)
         );
-        let texel = texel_values(core.words(), core.material(), x, y, lt, vt);
+        let texel = texel_values(core.words(), core.material(), x, y, &lt, &vt);
         assert_eq!(told(|o| c!(selvedge_texel_values(&m, x, y, &lt, &vt, o))), texel);
-        let between = trilinear_values(core.words(), core.material(), level, x, y, lt, vt);
+        let between = trilinear_values(core.words(), core.material(), level, x, y, &lt, &vt);
         assert_eq!(told(|o| c!(selvedge_trilinear_values(&m, level, x, y, &lt, &vt, o))), between);
         let [c0, c1, c2] = [0; 3].map(|_| numbers.word() as i32);
         let values = Values { c0, c1, c2 };
         assert_eq!(
             told(|o| c!(selvedge_radiance(&m, &values, &lt, o))),
-            radiance(core.material(), values, lt)
+            radiance(core.material(), values, &lt)
         );
     }
 }
@@ -637,7 +640,7 @@ fn mistakes_about_arguments_give_statuses() {
     for (bad, wanted) in
         [(null::<u8>(), SELVEDGE_NULL_POINTER), (askew((&raw const taps).cast()), SELVEDGE_MISALIGNED)]
     {
-        let (d, t): (*const Direction, *const Taps) = (bad.cast(), bad.cast());
+        let (d, t): (*const Direction, *const Located) = (bad.cast(), bad.cast());
         let statuses = [
             c!(selvedge_locate_light(&m, d, &mut located)),
             c!(selvedge_locate_view(&m, d, &mut located)),

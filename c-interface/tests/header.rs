@@ -183,6 +183,7 @@ fn rust_layouts() -> (BTreeSet<String>, BTreeMap<&'static str, Vec<&'static str>
         selvedge_metadata { texel_width_nm texel_height_nm frame image_origin primaries name origin licence }
         selvedge_direction { x_q18 y_q18 z_q15 }
         selvedge_taps { a b c weight_a_q15 weight_b_q15 weight_c_q15 cosine_q15 }
+        selvedge_located { direction clamped_x_q18 clamped_y_q18 taps }
         selvedge_values { c0 c1 c2 }
         selvedge_rgb { r g b }
         selvedge_query { u_q32 v_q32 light view }

@@ -7,7 +7,7 @@
 //! [`open`] checks every rule of the specification once. What it returns cannot fail:
 //!
 //! ```
-//! # let bytes = include_bytes!("../../tests/data/carpet07-excerpt.selv");
+//! # let bytes = include_bytes!("../tests/data/carpet07-excerpt.selv");
 //! use selvedge::{Direction, Limits};
 //!
 //! let material = selvedge::open(bytes, &Limits::default())?;
@@ -18,22 +18,23 @@
 //! # Ok::<(), selvedge::Finding>(())
 //! ```
 //!
-//! The modules follow the chapters of the specification; those marked with a star have a twin in WGSL.
-//!
-//! | chapter | modules |
+//! | chapter | modules; those marked with a star have a twin in WGSL |
 //! |---|---|
-//! | 1 conventions | [`words`]*, [`material`]*, [`error`], `check` |
-//! | 2 fixed-point arithmetic | [`fixed`]* |
-//! | 3 container | [`header`], [`directory`], [`metadata`] |
-//! | 4 stated cost | [`limits`], [`cost`] |
-//! | 5 directions | [`direction`]*, [`direction_set`] |
-//! | 6 position | [`position`]* |
-//! | 7 colour | [`colour`]* |
-//! | 8, 9 interpolation, levels | [`interpolation`]*, [`pair_table`] |
-//! | 10 sparse ensemble | `ensemble`*, `ensemble_set` |
-//! | 11 results and digest | [`result`] |
-//! | 12 sparse tensor | `tensor`*, `tensor_set` |
-//! | all of them together | `open`, and the fast paths `batch` and `image` |
+//! | 1 conventions | [`words`](kernel::words)*, [`material`](kernel::material)*, [`Rule`], `walk` |
+//! | 2 fixed-point arithmetic | [`fixed`](kernel::fixed)* |
+//! | 3 container | [`container`] |
+//! | 4 stated cost | [`Limits`], [`walk::cost`] |
+//! | 5 directions | [`direction`](kernel::direction)*, [`container::directions`] |
+//! | 6 position | [`position`](kernel::position)* |
+//! | 7 colour | [`colour`](kernel::colour)* |
+//! | 8, 9 interpolation, levels | [`interpolation`](kernel::interpolation)*, [`container::pair_table`] |
+//! | 10 sparse ensemble | `method::sparse_ensemble`* and its checks |
+//! | 11 decode digest | [`Selvedge::decode_digest`] |
+//! | 12 sparse tensor | `method::sparse_tensor`* and its checks |
+//! | all of them together | [`open`], [`Selvedge`], and the fast paths `batch` and `image` |
+//!
+//! What stands at the root is for embedders and stable within a version. [`kernel`], [`container`], [`method`]
+//! and [`walk`] are for tools, tests and second implementations, without a promise.
 
 #![no_std]
 #![forbid(unsafe_code)]
@@ -48,59 +49,32 @@
 extern crate std;
 
 #[cfg(feature = "batch")]
-pub mod batch;
-mod check;
-pub mod colour;
-pub mod cost;
-mod crc32;
-pub mod direction;
-pub mod direction_set;
-pub mod directory;
-#[cfg(feature = "sparse-ensemble")]
-pub mod ensemble;
-#[cfg(feature = "sparse-ensemble")]
-pub mod ensemble_set;
-pub mod error;
-pub mod fixed;
-pub mod header;
+mod batch;
+pub mod container;
+mod digest;
+mod error;
 #[cfg(feature = "batch")]
-pub mod image;
-pub mod interpolation;
-pub mod limits;
-pub mod material;
-pub mod metadata;
-#[cfg(not(feature = "sparse-ensemble"))]
-mod no_ensemble;
-#[cfg(not(feature = "sparse-tensor"))]
-mod no_tensor;
+mod fast;
+#[cfg(feature = "batch")]
+mod image;
+pub mod kernel;
+pub mod method;
 mod open;
-pub mod pair_table;
-pub mod position;
-#[cfg(feature = "batch")]
-mod records;
-pub mod result;
-mod sha256;
-#[cfg(any(feature = "sparse-ensemble", feature = "sparse-tensor"))]
-pub mod stream;
-#[cfg(feature = "sparse-tensor")]
-pub mod tensor;
-#[cfg(feature = "batch")]
-mod tensor_paths;
-#[cfg(feature = "sparse-tensor")]
-pub mod tensor_set;
-pub mod words;
+mod selvedge;
+pub mod walk;
 
 #[cfg(feature = "batch")]
 pub use batch::FilteredQuery;
-pub use check::Section;
-pub use colour::{Rgb, Values};
-pub use crc32::crc32;
-pub use direction::{Direction, Taps};
+pub use container::header::Header;
+pub use container::metadata::Metadata;
+pub use digest::{DIGEST_QUERIES, next_query_word};
 pub use error::{Family, Finding, First, Part, Rule, Sink};
-pub use header::Header;
-pub use limits::Limits;
-pub use material::Material;
-pub use metadata::Metadata;
-pub use open::{Selvedge, open, open_telling, open_with, validate};
-pub use result::{BufferTooSmall, position_from_f32};
-pub use sha256::{Digest, Sha256, sha256};
+pub use kernel::colour::{Rgb, Values};
+pub use kernel::direction::{Direction, Located, Taps};
+pub use kernel::material::Material;
+pub use open::{open, open_reporting, open_with, validate};
+pub use selvedge::{BufferTooSmall, Selvedge, position_from_f32};
+pub use walk::check::Section;
+pub use walk::crc32::crc32;
+pub use walk::limits::Limits;
+pub use walk::sha256::{Digest, Sha256, sha256};

@@ -83,7 +83,7 @@ mod measure {
     use selvedge::{Direction, Limits, Selvedge};
 
     static MATERIAL: &[u8] = include_bytes!("../../spec/vectors/valid/example.selv");
-    static LARGER: &[u8] = include_bytes!("../../tests/data/carpet07-excerpt.selv");
+    static LARGER: &[u8] = include_bytes!("../../decoder-core/tests/data/carpet07-excerpt.selv");
 
     const LENGTH: usize = 16 * 1024;
     const MARK: u8 = 0xa5;

@@ -1,4 +1,4 @@
-// Colour and transfer (chapter 7). Twin: decoder-core/src/colour.rs.
+// Colour and transfer (chapter 7). Twin: decoder-core/src/kernel/colour.rs.
 //
 // Three channel values in Q20 become three linear radiances as binary32 bits: a matrix, then either
 // a power of two less the file's offset, or a plain scale, then the cosine beyond the hull.
@@ -61,19 +61,19 @@ fn transfer_linear(x_q20: i32, exponent: i32, cosine_q15: i32) -> u32 {
 }
 
 // One colour's transfer (7.2, 7.3).
-fn transfer(material: Material, x_q20: i32, cosine_q15: i32) -> u32 {
-    if (material.transfer == TRANSFER_LOG2) {
-        return transfer_log2(x_q20, material.offset_mantissa_q31, material.exponent, cosine_q15);
+fn transfer(material: u32, x_q20: i32, cosine_q15: i32) -> u32 {
+    if (materials[material].transfer == TRANSFER_LOG2) {
+        return transfer_log2(x_q20, materials[material].offset_mantissa_q31, materials[material].exponent, cosine_q15);
     }
-    return transfer_linear(x_q20, material.exponent, cosine_q15);
+    return transfer_linear(x_q20, materials[material].exponent, cosine_q15);
 }
 
 // Channel values to linear radiance (7.1).
-fn colour(material: Material, values: Values, light_cosine_q15: i32) -> Rgb {
-    let m = material.matrix_q13;
+fn colour(material: u32, values: Values, light_cosine_q15: i32) -> Rgb {
+    let m = materials[material].matrix_q13;
     var cosine_q15 = ONE_Q15;
     // 7.4-2: only values that carry the light's cosine lose it beyond the hull.
-    if (material.cosine_included != 0u) {
+    if (materials[material].cosine_included != 0u) {
         cosine_q15 = light_cosine_q15;
     }
     return Rgb(

@@ -1,4 +1,4 @@
-// Directions and their triangulation (chapter 5). Twin: decoder-core/src/direction.rs.
+// Directions and their triangulation (chapter 5). Twin: decoder-core/src/kernel/direction.rs.
 //
 // A direction is a point of the unit disc under the stereographic projection x/(1+z), y/(1+z), with
 // its cosine in Q15. Samples have 14 fraction bits, so that every orientation test is exact in 32 bits;
@@ -28,6 +28,14 @@ struct Taps {
     weight_b_q15: i32,
     weight_c_q15: i32,
     cosine_q15: i32,
+}
+
+// A direction that was located in a set: what a method is given for the light and for the view.
+struct Located {
+    direction: Direction,
+    clamped_x_q18: i32,
+    clamped_y_q18: i32,
+    taps: Taps,
 }
 
 // |value| as Q30 with its sign, from binary32 bits; magnitudes of one and more, infinities and NaN give one (5.2-1).
@@ -157,8 +165,15 @@ fn grid_cell(q14: i32, grid_size: u32) -> u32 {
     return min(cell, grid_size - 1u);
 }
 
-// The taps of a direction in the set at `start` (5.6).
-fn locate(start: u32, asked: Direction) -> Taps {
+// A sample direction as one that was located: itself, with one tap (8.5).
+fn locate_sample(start: u32, index: u32) -> Located {
+    let direction = sample_direction(start, index);
+    // 5.7-9: its point is on the hull or inside.
+    return Located(direction, direction.x_q18, direction.y_q18, single_tap(index));
+}
+
+// A direction located in the set at `start` (5.6).
+fn locate(start: u32, asked: Direction) -> Located {
     let direction = clamp_direction(asked);
     let px = coarse_q14(direction.x_q18);
     let py = coarse_q14(direction.y_q18);
@@ -204,15 +219,17 @@ fn locate(start: u32, asked: Direction) -> Taps {
             let weight_c = ONE_Q15 - weight_a - weight_b;
             // 5.6-3: at and below the horizon no light arrives. select(if false, if true, condition)
             let cosine = select(0, ONE_Q15, direction.z_q15 > 0);
-            return Taps(a, b, c, weight_a, weight_b, weight_c, cosine);
+            let taps = Taps(a, b, c, weight_a, weight_b, weight_c, cosine);
+            // 5.7-9: inside the hull the point is the direction's own.
+            return Located(direction, direction.x_q18, direction.y_q18, taps);
         }
         candidate += 1u;
     }
     return locate_on_hull(start, direction);
 }
 
-// The taps of the place on the hull nearest to a point that no triangle holds (5.7).
-fn locate_on_hull(start: u32, direction: Direction) -> Taps {
+// A direction whose point no triangle holds, located at the nearest place on the hull (5.7).
+fn locate_on_hull(start: u32, direction: Direction) -> Located {
     let px = coarse_q14(direction.x_q18);
     let py = coarse_q14(direction.y_q18);
     let hull = hull_start(start);
@@ -272,8 +289,14 @@ fn dot_product(ax: i32, ay: i32, bx: i32, by: i32, px: i32, py: i32) -> i32 {
     return first + second;
 }
 
-// Two directions of the hull, and the cosine beyond it (5.7-5).
-fn beyond_hull(start: u32, direction: Direction, a: u32, b: u32, weight_b: i32) -> Taps {
+// A coordinate between two directions of the hull, Q18 (5.7-9).
+fn between_q18(a_q14: i32, b_q14: i32, weight_b_q15: i32) -> i32 {
+    // 5.7-9: from Q29 to Q18, halves up.
+    return (a_q14 << 4u) + (((b_q14 - a_q14) * weight_b_q15 + 1024) >> 11u);
+}
+
+// Located between two directions of the hull, with the cosine beyond it (5.7-5).
+fn beyond_hull(start: u32, direction: Direction, a: u32, b: u32, weight_b: i32) -> Located {
     let weight_a = ONE_Q15 - weight_b;
     let za = point_z_q15(start, a) * weight_a;
     let zb = point_z_q15(start, b) * weight_b;
@@ -284,5 +307,14 @@ fn beyond_hull(start: u32, direction: Direction, a: u32, b: u32, weight_b: i32) 
     if (direction.z_q15 < sampled) {
         cosine = i32(divide(u32(direction.z_q15), u32(sampled), 15u));
     }
-    return Taps(a, b, a, weight_a, weight_b, 0, cosine);
+    let taps = Taps(a, b, a, weight_a, weight_b, 0, cosine);
+    let point_a = point(start, a);
+    let point_b = point(start, b);
+    // 5.7-9: the point on the hull.
+    return Located(
+        direction,
+        between_q18(low_i16(point_a), low_i16(point_b), weight_b),
+        between_q18(high_i16(point_a), high_i16(point_b), weight_b),
+        taps,
+    );
 }

@@ -1,4 +1,4 @@
-// Fixed-point arithmetic (chapter 2). Twin: decoder-core/src/fixed.rs.
+// Fixed-point arithmetic (chapter 2). Twin: decoder-core/src/kernel/fixed.rs.
 //
 // Everything that decides a bit of a result is here or built from what is here: 32-bit integers that
 // wrap, shifts, comparisons. There is no division and no float, so every machine agrees.
@@ -65,7 +65,7 @@ fn divide(n: u32, d: u32, bits: u32) -> u32 {
     return quotient;
 }
 
-// x limited to -bound ..= bound (2.2-6).
+// x clamped to -bound ..= bound (2.2-6).
 fn clamp_magnitude(x: i32, bound: i32) -> i32 {
     // 2.2-6: bounds are positive, so their negation exists.
     return max(min(x, bound), -bound);

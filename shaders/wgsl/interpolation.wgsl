@@ -1,10 +1,9 @@
-// Interpolation in the model (chapter 8) and levels (chapter 9). Twin: decoder-core/src/interpolation.rs.
+// Interpolation in the model (chapter 8). Twin: decoder-core/src/kernel/interpolation.rs.
 //
 // What every method shares: means and scales for pairs of directions, the value of a channel, and the
-// samples that a caller can ask for. The method adds the texture: texture_q20 of a channel, or
-// textures_q20 of all at once.
+// samples that a caller can ask for. The method adds the textures of all channels: textures_q20.
 
-// Channel values are limited to this magnitude, Q20: 128 (8.1-4).
+// Channel values are clamped to this magnitude, Q20: 128 (8.1-4).
 const VALUE_BOUND: i32 = 0x08000000;
 
 // A table of 16-bit numbers for pairs of directions, blended over nine of them, in Q15 (8.1).
@@ -29,29 +28,34 @@ fn blend_row(row: u32, taps: Taps) -> i32 {
     return a + b + c;
 }
 
-// The mean of a channel for a pair of directions, Q20 (8.1-3).
-fn mean_q20(material: Material, channel: Channel, light: Taps, view: Taps) -> i32 {
+// The mean of a channel for a pair of directions, Q20; zero for a channel without means (8.1-3).
+fn mean_q20(material: u32, channel: Channel, light: Taps, view: Taps) -> i32 {
     let start = channel.mean_start;
-    let blended_q15 = blend_table_q15(start, material.light_count, light, view);
+    // 8.1-8: a channel without means has the mean zero.
+    if (start == 0u) {
+        return 0;
+    }
+    let blended_q15 = blend_table_q15(start, materials[material].light_count, light, view);
     let base_q20 = i32(word(start));
     // 8.1-3: shift is at most 11, so the table reaches 2^26 and with the base 2^27.
     return round_shift(blended_q15, 15u - word(start + 1u)) + base_q20;
 }
 
 // The scale of a channel for a pair of directions, Q15 (8.2-1).
-fn scale_q15(material: Material, channel: Channel, light: Taps, view: Taps) -> i32 {
+fn scale_q15(material: u32, channel: Channel, light: Taps, view: Taps) -> i32 {
     // 8.2-1: blended like the means, to 16 bits.
-    return round_shift(blend_table_q15(channel.scale_start, material.light_count, light, view), 15u);
+    return round_shift(blend_table_q15(channel.scale_start, materials[material].light_count, light, view), 15u);
 }
 
 // A texture times a scale of 2^shift units, Q20 (8.2-2).
 fn scale_texture(texture: i32, scale: i32, shift: u32) -> i32 {
-    // 8.2-2: limited before the shift, so that nothing is lost above.
+    // 8.2-2: clamped before the shift, so that nothing is lost above.
     return clamp_magnitude(multiply_q15(texture, scale), VALUE_BOUND >> shift) << shift;
 }
 
-// The value of a channel at one level, Q20 (8.3); `given` is its texture where the method gives those of all channels at once.
-fn channel_q20(material: Material, channel: Channel, given: i32, level: u32, x: Axis, y: Axis, light: Taps, view: Taps) -> i32 {
+// The value of a channel, Q20, from its texture and located directions (8.3).
+fn channel_q20(material: u32, number: u32, given: i32, light: Taps, view: Taps) -> i32 {
+    let channel = channel_of(material, number);
     // 8.3-1: a missing channel is zero.
     if (channel.state == CHANNEL_MISSING) {
         return 0;
@@ -62,10 +66,6 @@ fn channel_q20(material: Material, channel: Channel, given: i32, level: u32, x: 
         return clamp_magnitude(mean, VALUE_BOUND);
     }
     var texture = given;
-    // 8.3-3: a sparse ensemble gives each channel's texture by itself.
-    if (material.method != METHOD_SPARSE_TENSOR) {
-        texture = texture_q20(material, channel, level, x, y, light, view);
-    }
     // 8.2-3: a channel without scales keeps its texture.
     if (channel.scale_start != 0u) {
         let scale = scale_q15(material, channel, light, view);
@@ -75,24 +75,12 @@ fn channel_q20(material: Material, channel: Channel, given: i32, level: u32, x: 
     return clamp_magnitude(texture + mean, VALUE_BOUND);
 }
 
-// Channel `number` of a material (8.3).
-fn channel_of(material: Material, number: u32) -> Channel {
-    // 8.3-4: by comparison, so that no index can be out of range.
-    if (number == 0u) {
-        return material.channels[0];
-    }
-    if (number == 1u) {
-        return material.channels[1];
-    }
-    return material.channels[2];
-}
-
-// The values of all channels at one level (8.3).
-fn level_values(material: Material, level: u32, x: Axis, y: Axis, light: Taps, view: Taps) -> Values {
+// The values of all channels at one place (8.3).
+fn place_values(material: u32, place: Place, light: Located, view: Located) -> Values {
     var values = Values(0, 0, 0);
-    // 8.3-3: a sparse tensor gives the textures of all channels at once.
-    if (material.method == METHOD_SPARSE_TENSOR && material.full_count != 0u) {
-        values = textures_q20(material, level, x, y, light, view);
+    // 8.3-3: the method gives the textures of all channels.
+    if (materials[material].full_count != 0u) {
+        values = textures_q20(material, place, light, view);
     }
     // 8.3-4: a loop, so that a compiler for GPUs makes one copy of a channel.
     for (var number = 0u; number < 3u; number++) {
@@ -103,7 +91,7 @@ fn level_values(material: Material, level: u32, x: Axis, y: Axis, light: Taps, v
         if (number == 2u) {
             given = values.c2;
         }
-        let value = channel_q20(material, channel_of(material, number), given, level, x, y, light, view);
+        let value = channel_q20(material, number, given, light.taps, view.taps);
         if (number == 0u) {
             values.c0 = value;
         }
@@ -117,66 +105,73 @@ fn level_values(material: Material, level: u32, x: Axis, y: Axis, light: Taps, v
     return values;
 }
 
+// The place of a position at a level (6.3).
+fn place_at_position(material: u32, level: u32, u_q32: u32, v_q32: u32) -> Place {
+    let edge = materials[material].edge;
+    let edge_reciprocal_q18 = materials[material].edge_reciprocal_q18;
+    let width = level_size(materials[material].width, level);
+    let height = level_size(materials[material].height, level);
+    return Place(
+        level,
+        axis_at_position(edge, edge_reciprocal_q18, width, u_q32),
+        axis_at_position(edge, edge_reciprocal_q18, height, v_q32),
+    );
+}
+
+// The place of a texel that is there, at a level (6.2-2).
+fn place_at_texel(material: u32, level: u32, texel_x: u32, texel_y: u32) -> Place {
+    let edge = materials[material].edge;
+    let edge_reciprocal_q18 = materials[material].edge_reciprocal_q18;
+    return Place(
+        level,
+        axis_at_texel(edge, edge_reciprocal_q18, texel_x),
+        axis_at_texel(edge, edge_reciprocal_q18, texel_y),
+    );
+}
+
 // Values between two texels of each axis of one level (8.4).
-fn filtered_values(material: Material, level: u32, u_q32: u32, v_q32: u32, light: Taps, view: Taps) -> Values {
+fn filtered_values(material: u32, level: u32, u_q32: u32, v_q32: u32, light: Located, view: Located) -> Values {
     // 8.4-4: a level beyond the last is the last.
-    let inside = min(level, material.level_count - 1u);
-    let x = axis_at_position(material.edge, material.edge_reciprocal_q18, level_size(material.width, inside), u_q32);
-    let y = axis_at_position(material.edge, material.edge_reciprocal_q18, level_size(material.height, inside), v_q32);
-    return level_values(material, inside, x, y, light, view);
-}
-
-// Part of the way from one value to another (9.2-3).
-fn between(from_value: i32, to_value: i32, fraction_q15: i32) -> i32 {
-    // 9.2-3: values are within 2^27, so the difference is exact.
-    return from_value + multiply_q15(to_value - from_value, fraction_q15);
-}
-
-// Values between two levels, the level in Q16 (9.2).
-fn trilinear_values(material: Material, level_q16: u32, u_q32: u32, v_q32: u32, light: Taps, view: Taps) -> Values {
-    // 9.2-1: beyond the last level lies the last level.
-    let limited = min(level_q16, (material.level_count - 1u) << 16u);
-    let level = limited >> 16u;
-    let fraction_q15 = i32((limited & 0xffffu) >> 1u);
-    var values = filtered_values(material, level, u_q32, v_q32, light, view);
-    // 9.2-2: on a level nothing else is read.
-    if (fraction_q15 != 0) {
-        let coarse = filtered_values(material, level + 1u, u_q32, v_q32, light, view);
-        values.c0 = between(values.c0, coarse.c0, fraction_q15);
-        values.c1 = between(values.c1, coarse.c1, fraction_q15);
-        values.c2 = between(values.c2, coarse.c2, fraction_q15);
-    }
-    return values;
+    let inside = min(level, materials[material].level_count - 1u);
+    return place_values(material, place_at_position(material, inside, u_q32, v_q32), light, view);
 }
 
 // Values of one texel of level 0 for one pair of sample directions (8.5).
-fn point_values(material: Material, texel_x: u32, texel_y: u32, light_index: u32, view_index: u32) -> Values {
-    // 8.5-1: an index beyond the end is moved to the last.
-    let light = single_tap(min(light_index, material.light_count - 1u));
-    let view = single_tap(min(view_index, material.view_count - 1u));
+fn point_values(material: u32, texel_x: u32, texel_y: u32, light_index: u32, view_index: u32) -> Values {
+    // 8.5-1: an index beyond the end is clamped to the last.
+    let light = light_sample(material, light_index);
+    let view = view_sample(material, view_index);
     return texel_values(material, texel_x, texel_y, light, view);
 }
 
 // Values of one texel of level 0 for located directions (8.5).
-fn texel_values(material: Material, texel_x: u32, texel_y: u32, light: Taps, view: Taps) -> Values {
-    let inside_x = min(texel_x, material.width - 1u);
-    let inside_y = min(texel_y, material.height - 1u);
-    let x = axis_at_texel(material.edge, material.edge_reciprocal_q18, inside_x);
-    let y = axis_at_texel(material.edge, material.edge_reciprocal_q18, inside_y);
-    return level_values(material, 0u, x, y, light, view);
+fn texel_values(material: u32, texel_x: u32, texel_y: u32, light: Located, view: Located) -> Values {
+    let inside_x = min(texel_x, materials[material].width - 1u);
+    let inside_y = min(texel_y, materials[material].height - 1u);
+    return place_values(material, place_at_texel(material, 0u, inside_x, inside_y), light, view);
 }
 
-// The taps of a light direction (5.6).
-fn locate_light(material: Material, direction: Direction) -> Taps {
-    return locate(material.light_start, direction);
+// A light direction, located (5.6).
+fn locate_light(material: u32, direction: Direction) -> Located {
+    return locate(materials[material].light_start, direction);
 }
 
-// The taps of a view direction (5.6).
-fn locate_view(material: Material, direction: Direction) -> Taps {
-    return locate(material.view_start, direction);
+// A view direction, located (5.6).
+fn locate_view(material: u32, direction: Direction) -> Located {
+    return locate(materials[material].view_start, direction);
+}
+
+// Sample direction `index` of the light, located; beyond the end the last (8.5).
+fn light_sample(material: u32, index: u32) -> Located {
+    return locate_sample(materials[material].light_start, min(index, materials[material].light_count - 1u));
+}
+
+// Sample direction `index` of the view, located; beyond the end the last (8.5).
+fn view_sample(material: u32, index: u32) -> Located {
+    return locate_sample(materials[material].view_start, min(index, materials[material].view_count - 1u));
 }
 
 // Linear radiance of values seen under a located light (7.1).
-fn radiance(material: Material, values: Values, light: Taps) -> Rgb {
-    return colour(material, values, light.cosine_q15);
+fn radiance(material: u32, values: Values, light: Located) -> Rgb {
+    return colour(material, values, light.taps.cosine_q15);
 }

@@ -1,4 +1,4 @@
-// Position and wrap (chapter 6). Twin: decoder-core/src/position.rs.
+// Position and wrap (chapter 6). Twin: decoder-core/src/kernel/position.rs.
 //
 // A position is a fraction of the image in u0.32 per axis, so that it wraps by itself. A filtered
 // sample stands between two texels of each axis, which lie in one block or in two neighbours.
@@ -17,6 +17,13 @@ struct Axis {
     first: Span,
     second: Span,
     count: u32,
+}
+
+// Where a texture is asked for: a level of detail, and texels along both axes.
+struct Place {
+    level: u32,
+    x: Axis,
+    y: Axis,
 }
 
 // The u0.32 fraction of a binary32 position, by its bits (6.1-2).
@@ -91,7 +98,7 @@ fn texel_at_position(size: u32, position_q32: u32) -> u32 {
 }
 
 // Blocks along an axis of `size` texels (6.2-3).
-fn block_count(material: Material, size: u32) -> u32 {
+fn block_count(material: u32, size: u32) -> u32 {
     // 6.2-3: the last block may be partly outside the image.
-    return block_of(material.edge_reciprocal_q18, size - 1u) + 1u;
+    return block_of(materials[material].edge_reciprocal_q18, size - 1u) + 1u;
 }

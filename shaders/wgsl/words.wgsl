@@ -1,4 +1,4 @@
-// The file as 32-bit words (chapter 1). Twin: decoder-core/src/words.rs.
+// The file as 32-bit words (chapter 1). Twin: decoder-core/src/kernel/words.rs.
 //
 // All files stand in one buffer; word numbers in a Material already count from its begin.
 

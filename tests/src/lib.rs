@@ -11,6 +11,11 @@ pub fn excerpt_folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("data/sparsebtf")
 }
 
+/// The file that is imported from it.
+pub fn excerpt_file() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../decoder-core/tests/data/carpet07-excerpt.selv")
+}
+
 /// The full data, if `SELVEDGE_DATA` names them; says so loudly if not.
 pub fn full_data_folder(what_is_skipped: &str) -> Option<PathBuf> {
     let folder = std::env::var_os("SELVEDGE_DATA")

@@ -21,8 +21,7 @@ use selvedge_tools::methods::sparse_ensemble::quantise::{FloatRecord, quantise};
 use std::path::Path;
 
 fn excerpt() -> MaterialModel {
-    let file = std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("data/carpet07-excerpt.selv"))
-        .expect("excerpt");
+    let file = std::fs::read(selvedge_tests::excerpt_file()).expect("excerpt");
     read_model(&file, None, &Limits::NONE).expect("legal")
 }
 

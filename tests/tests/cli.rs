@@ -1,6 +1,6 @@
 //! The program as a user meets it: exit codes, silence, whole files.
 
-use selvedge_tests::{excerpt_folder, program};
+use selvedge_tests::{excerpt_file, excerpt_folder, program};
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -73,7 +73,7 @@ fn a_dictionary_of_its_own() {
 #[test]
 fn exit_codes_tell_the_families_apart() {
     let folder = tempfile::tempdir().expect("folder");
-    let good = excerpt_folder().join("../carpet07-excerpt.selv");
+    let good = excerpt_file();
     let bytes = std::fs::read(&good).expect("file");
     let write = |name: &str, bytes: &[u8]| {
         let path = folder.path().join(name);
@@ -114,15 +114,7 @@ fn no_output_is_left_half_written() {
     }
     assert_eq!(code(&["import", text(&broken), "--material", "carpet07", "-o", text(&old)]), 3);
     assert_eq!(std::fs::read(&old).expect("still there"), b"precious");
-    assert_eq!(
-        code(&[
-            "decode",
-            text(&excerpt_folder().join("../carpet07-excerpt.selv")),
-            "-o",
-            text(&folder.path().join("picture.gif"))
-        ]),
-        1
-    );
+    assert_eq!(code(&["decode", text(&excerpt_file()), "-o", text(&folder.path().join("picture.gif"))]), 1);
     let names: Vec<_> =
         std::fs::read_dir(folder.path()).expect("folder").map(|e| e.expect("entry").file_name()).collect();
     assert_eq!(names.len(), 2, "{names:?}");

@@ -149,7 +149,7 @@ fn the_method_auto_takes_the_best_of_those_that_reach_the_goal() {
 
 #[test]
 fn bench_tells_rates_of_a_file() {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/carpet07-excerpt.selv");
+    let file = selvedge_tests::excerpt_file();
     let told: Value =
         serde_json::from_slice(&succeed(&["bench", "--json", text(&file)]).stdout).expect("JSON");
     let first = &told[0];

@@ -2,7 +2,7 @@
 //! full materials where `SELVEDGE_DATA` is set.
 
 use selvedge::{Direction, Limits};
-use selvedge_tests::{excerpt_folder, full_data_folder};
+use selvedge_tests::{excerpt_file, excerpt_folder, full_data_folder};
 use selvedge_tools::format::triangulate;
 use selvedge_tools::format::write;
 use selvedge_tools::gpu::runner::{Gpu, Query, backends};
@@ -108,7 +108,7 @@ fn the_excerpt_imports_to_the_same_bytes() {
     let model = sparsebtf::read_material(&excerpt_folder(), "carpet07", None)
         .and_then(|m| m.to_model(VALUE_BITS))
         .expect("data");
-    let stored = std::fs::read(excerpt_folder().join("../carpet07-excerpt.selv")).expect("file");
+    let stored = std::fs::read(excerpt_file()).expect("file");
     assert!(write::write_material(&model) == stored);
 }
 

@@ -16,7 +16,7 @@ use selvedge_tools::methods::sparse_ensemble::example::example_model;
 use std::path::Path;
 
 fn excerpt() -> Vec<u8> {
-    std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("data/carpet07-excerpt.selv")).expect("excerpt")
+    std::fs::read(selvedge_tests::excerpt_file()).expect("excerpt")
 }
 
 fn open(file: &[u8]) -> Selvedge<'_> {

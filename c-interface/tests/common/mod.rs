@@ -16,7 +16,7 @@ pub fn here() -> PathBuf {
 
 /// A measured material of 60 x 60 texels.
 pub fn fixture() -> PathBuf {
-    here().join("../tests/data/carpet07-excerpt.selv")
+    here().join("../decoder-core/tests/data/carpet07-excerpt.selv")
 }
 
 /// Its bytes.

@@ -3,7 +3,7 @@
 use crate::error::{Result, ToolError};
 use naga::back;
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
-use selvedge_shaders::{ENTRY_POINTS, Method, Request, assemble};
+use selvedge_shaders::{ENTRIES, Request, assemble};
 
 /// A file name and its content.
 pub type KernelFile = (String, Vec<u8>);
@@ -20,20 +20,33 @@ fn validated(source: &str) -> Result<(naga::Module, ModuleInfo)> {
     Ok((module, info))
 }
 
-/// The methods of this version.
-const METHODS: &[Method] = &selvedge_shaders::METHODS;
+/// The kernel of some methods with all entry points, as WGSL.
+///
+/// # Errors
+/// [`ToolError::Usage`] if there is no method of a name.
+pub fn source(methods: &[&str]) -> Result<String> {
+    let entries: Vec<&str> = ENTRIES.iter().map(|entry| entry.name).collect();
+    Ok(assemble(&request(methods, &entries)?))
+}
 
-/// The kernel with its entry points, as WGSL.
-pub fn source() -> String {
-    assemble(&Request { methods: METHODS, entries: true })
+fn request(methods: &[&str], entries: &[&str]) -> Result<Request> {
+    Request::new(methods, entries).map_err(|unknown| ToolError::Usage(unknown.to_string()))
+}
+
+/// Names of all methods.
+pub fn method_names() -> Vec<&'static str> {
+    selvedge_shaders::METHODS.iter().map(|method| method.name).collect()
 }
 
 /// Every translation: `selvedge.wgsl` (with entry points), `selvedge_functions.wgsl` (without),
 /// `selvedge.spv`, `selvedge.metal`, `selvedge.hlsl`, and one `selvedge_NAME.comp` in GLSL ES 3.1 for each
 /// entry point.
-pub fn translate() -> Result<Vec<KernelFile>> {
-    let source = source();
-    let functions = assemble(&Request { methods: METHODS, entries: false });
+///
+/// # Errors
+/// [`ToolError::Usage`] if there is no method of a name; [`ToolError::Kernel`] if naga refuses the text.
+pub fn translate(methods: &[&str]) -> Result<Vec<KernelFile>> {
+    let source = source(methods)?;
+    let functions = assemble(&request(methods, &[])?);
     validated(&functions)?;
     let (module, info) = validated(&source)?;
     let mut files = vec![
@@ -57,7 +70,7 @@ pub fn translate() -> Result<Vec<KernelFile>> {
     back::hlsl::Writer::new(&mut text, &options, &pipeline).write(&module, &info, None).map_err(fail)?;
     files.push(("selvedge.hlsl".into(), text.into_bytes()));
 
-    for entry in ENTRY_POINTS {
+    for entry in ENTRIES.iter().map(|entry| entry.name) {
         let mut text = String::new();
         let options = back::glsl::Options {
             version: back::glsl::Version::Embedded { version: 310, is_webgl: false },

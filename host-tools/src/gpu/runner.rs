@@ -3,6 +3,7 @@
 use crate::error::{Result, ToolError};
 use crate::math::random::Random;
 use selvedge::{Direction, Rgb, Selvedge, Values};
+use selvedge_shaders::{Request, assemble};
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 use wgpu::util::DeviceExt as _;
@@ -49,29 +50,30 @@ pub fn direction_words(direction: Direction) -> [u32; 3] {
 
 /// What the core answers to a query of an entry point.
 pub fn answer_on_cpu(material: &Selvedge<'_>, entry: &str, query: &Query) -> Answer {
-    use selvedge::direction::{direction_from_binary32, single_tap};
-    use selvedge::interpolation::{filtered_values, radiance, trilinear_values};
-    use selvedge::position::fraction_from_binary32;
+    use selvedge::kernel::direction::direction_from_binary32;
+    use selvedge::kernel::interpolation::{filtered_values, light_sample, radiance};
+    use selvedge::kernel::levels::trilinear_values;
+    use selvedge::kernel::position::fraction_from_binary32;
     let (words, m) = (material.words(), material.material());
     let [lx, ly, lz] = query.light;
     let [vx, vy, vz] = query.view;
     if entry == "texel" {
         let values = material.point_values(query.u, query.v, lx, vx);
-        return Answer::new(radiance(m, values, single_tap(lx)), values);
+        return Answer::new(radiance(m, values, &light_sample(words, m, lx)), values);
     }
     let direction = |[x, y, z]: [u32; 3]| Direction { x_q18: x as i32, y_q18: y as i32, z_q15: z as i32 };
     let floats = entry == "floats";
     let of = |x, y, z| if floats { direction_from_binary32(x, y, z) } else { direction([x, y, z]) };
     let (light, view) = (material.locate_light(of(lx, ly, lz)), material.locate_view(of(vx, vy, vz)));
     let values = match entry {
-        "filtered" => filtered_values(words, m, 0, query.u, query.v, light, view),
+        "filtered" => filtered_values(words, m, 0, query.u, query.v, &light, &view),
         "floats" => {
             let (u, v) = (fraction_from_binary32(query.u), fraction_from_binary32(query.v));
-            trilinear_values(words, m, query.level_q16, u, v, light, view)
+            trilinear_values(words, m, query.level_q16, u, v, &light, &view)
         }
-        _ => trilinear_values(words, m, query.level_q16, query.u, query.v, light, view),
+        _ => trilinear_values(words, m, query.level_q16, query.u, query.v, &light, &view),
     };
-    Answer::new(radiance(m, values, light), values)
+    Answer::new(radiance(m, values, &light), values)
 }
 
 /// Backends by name: `vulkan`, `gl`, or all for anything else.
@@ -83,14 +85,16 @@ pub fn backends(name: &str) -> wgpu::Backends {
     }
 }
 
-/// An adapter with the kernel compiled.
+/// What a pipeline is compiled for: methods by name, and an entry point.
+type PipelineKey = (Vec<&'static str>, String);
+
+/// An adapter, and the pipelines that were asked for so far.
 pub struct Gpu {
     device: wgpu::Device,
     queue: wgpu::Queue,
-    module: wgpu::ShaderModule,
     layout: wgpu::BindGroupLayout,
     pipeline_layout: wgpu::PipelineLayout,
-    pipelines: Mutex<BTreeMap<String, wgpu::ComputePipeline>>,
+    pipelines: Mutex<BTreeMap<PipelineKey, wgpu::ComputePipeline>>,
     /// Name, backend and kind of the adapter.
     pub description: String,
 }
@@ -99,6 +103,8 @@ pub struct Gpu {
 pub struct Loaded {
     files: wgpu::Buffer,
     materials: wgpu::Buffer,
+    /// Methods that the materials have: what a kernel for them is assembled of.
+    methods: Vec<&'static str>,
 }
 
 impl Gpu {
@@ -135,11 +141,6 @@ impl Gpu {
         let descriptor = wgpu::DeviceDescriptor { required_limits, ..Default::default() };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
             .map_err(|e| ToolError::Kernel(e.to_string()))?;
-        let source = crate::gpu::kernel::source();
-        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some("selvedge"),
-            source: wgpu::ShaderSource::Wgsl(source.into()),
-        });
         let entries: Vec<wgpu::BindGroupLayoutEntry> = (0..4)
             .map(|binding| wgpu::BindGroupLayoutEntry {
                 binding,
@@ -161,13 +162,17 @@ impl Gpu {
         });
         let description = format!("{} ({:?}, {:?})", info.name, info.backend, info.device_type);
         let pipelines = Mutex::default();
-        Ok(Some(Gpu { device, queue, module, layout, pipeline_layout, pipelines, description }))
+        Ok(Some(Gpu { device, queue, layout, pipeline_layout, pipelines, description }))
     }
 
     /// Puts materials into one buffer, each with its dictionary behind it.
     pub fn load(&self, materials: &[Selvedge<'_>]) -> Loaded {
         let mut files: Vec<u8> = Vec::new();
         let mut records = Vec::new();
+        let of = |method: &&selvedge_shaders::Method| {
+            materials.iter().any(|material| material.material().method == method.number)
+        };
+        let methods = selvedge_shaders::METHODS.iter().filter(of).map(|method| method.name).collect();
         for material in materials {
             let words = material.words();
             let file_start = files.len() / 4;
@@ -188,23 +193,38 @@ impl Gpu {
         Loaded {
             files: buffer("files", &files),
             materials: buffer("materials", bytemuck::cast_slice(&records)),
+            methods,
         }
     }
 
-    /// The pipeline of an entry point, compiled when it is first asked for.
-    fn pipeline(&self, entry: &str) -> wgpu::ComputePipeline {
+    /// The pipeline of an entry point for the methods of some materials, compiled when it is first asked for.
+    ///
+    /// The shader has nothing else in it, since compilers of drivers take seconds for what is never called.
+    ///
+    /// # Errors
+    /// [`ToolError::Kernel`] if there is no such entry point.
+    fn pipeline(&self, loaded: &Loaded, entry: &str) -> Result<wgpu::ComputePipeline> {
         let mut pipelines = self.pipelines.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        let compile = || {
-            self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some(entry),
-                layout: Some(&self.pipeline_layout),
-                module: &self.module,
-                entry_point: Some(entry),
-                compilation_options: Default::default(),
-                cache: None,
-            })
-        };
-        pipelines.entry(entry.to_owned()).or_insert_with(compile).clone()
+        let key = (loaded.methods.clone(), entry.to_owned());
+        if let Some(pipeline) = pipelines.get(&key) {
+            return Ok(pipeline.clone());
+        }
+        let request = Request::new(&loaded.methods, &[entry]);
+        let source = assemble(&request.map_err(|unknown| ToolError::Kernel(unknown.to_string()))?);
+        let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some("selvedge"),
+            source: wgpu::ShaderSource::Wgsl(source.into()),
+        });
+        let pipeline = self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(entry),
+            layout: Some(&self.pipeline_layout),
+            module: &module,
+            entry_point: Some(entry),
+            compilation_options: Default::default(),
+            cache: None,
+        });
+        pipelines.insert(key, pipeline.clone());
+        Ok(pipeline)
     }
 
     fn run(
@@ -215,7 +235,7 @@ impl Gpu {
         answers: usize,
         groups: [u32; 2],
     ) -> Result<Vec<Answer>> {
-        let pipeline = self.pipeline(entry);
+        let pipeline = self.pipeline(loaded, entry)?;
         let contents = bytemuck::cast_slice(queries);
         let query_buffer = self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
             label: Some("queries"),

@@ -1,0 +1,229 @@
+//! The header (chapter 3.1) and the caller's limits (chapter 4.1).
+
+use crate::error::{Part, Rule};
+use crate::kernel::material::{CHANNEL_FULL, TRANSFER_LINEAR, TRANSFER_LOG2, level_size};
+use crate::method::method_of;
+use crate::walk::check::Check;
+use crate::walk::crc32::crc32;
+use crate::walk::limits::Limits;
+
+/// `SELV`, then the bytes that tell a text-mode transfer.
+pub const MAGIC: [u8; 8] = [0x53, 0x45, 0x4c, 0x56, 0x0d, 0x0a, 0x1a, 0x0a];
+/// The only major version.
+pub const MAJOR_VERSION: u32 = 1;
+/// Bytes of the header.
+pub const HEADER_LENGTH: u32 = 128;
+/// Bytes of a directory entry.
+pub const ENTRY_LENGTH: u32 = 16;
+/// Most texels along the side of a block of any method (3.1-12).
+pub const EDGE_LIMIT: u32 = 16;
+/// A material.
+pub const CONTENT_MATERIAL: u32 = 0;
+/// A dictionary that materials name by digest.
+pub const CONTENT_DICTIONARY: u32 = 1;
+
+/// The fields of a header.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Header {
+    /// Minor version; readers of this version take all.
+    pub minor_version: u32,
+    /// Bytes of the whole file.
+    pub file_length: u32,
+    /// [`CONTENT_MATERIAL`] or [`CONTENT_DICTIONARY`].
+    pub content: u32,
+    /// Number of the method.
+    pub method: u32,
+    /// Entries of the directory.
+    pub section_count: u32,
+    /// Stated operations of a filtered sample at worst.
+    pub operations: u32,
+    /// Texels along x.
+    pub width: u32,
+    /// Texels along y.
+    pub height: u32,
+    /// Light directions.
+    pub light_count: u32,
+    /// View directions.
+    pub view_count: u32,
+    /// Levels of detail.
+    pub level_count: u32,
+    /// Texels along the side of a block.
+    pub edge: u32,
+    /// Quality layers.
+    pub layer_count: u32,
+    /// State of each channel.
+    pub states: [u32; 3],
+    /// Transfer.
+    pub transfer: u32,
+    /// 1 if the light's cosine is in the values.
+    pub cosine_included: u32,
+    /// Bits of the log offset, or the linear exponent.
+    pub transfer_parameter: u32,
+    /// Colour matrix.
+    pub matrix_q13: [i32; 9],
+}
+
+impl Header {
+    /// Whether channel `c` has texture.
+    pub fn is_full(&self, c: u32) -> bool {
+        self.states.get(c as usize).is_some_and(|&state| state == CHANNEL_FULL)
+    }
+
+    /// Whether any channel has texture.
+    pub fn has_texture(&self) -> bool {
+        self.states.contains(&CHANNEL_FULL)
+    }
+
+    /// Reads the fields of a header that is long enough; nothing is checked.
+    pub fn read(word_at: impl Fn(u32) -> u32) -> Header {
+        let word = |index: u32| word_at(index.wrapping_mul(4));
+        let byte = |index: u32, n: u32| (word(index) >> (n & 3).wrapping_mul(8)) & 0xff;
+        let entry =
+            |n: u32| ((word(17u32.wrapping_add(n >> 1)) << (16u32.wrapping_sub((n & 1) << 4))) as i32) >> 16;
+        Header {
+            minor_version: word(2) >> 16,
+            file_length: word(3),
+            content: word(4),
+            method: word(5),
+            section_count: word(6),
+            operations: word(7),
+            width: word(8),
+            height: word(9),
+            light_count: word(10),
+            view_count: word(11),
+            level_count: word(12),
+            edge: byte(13, 0),
+            layer_count: byte(13, 1),
+            states: [byte(14, 0), byte(14, 1), byte(14, 2)],
+            transfer: byte(15, 0),
+            cosine_included: byte(15, 1),
+            transfer_parameter: word(16),
+            matrix_q13: [
+                entry(0),
+                entry(1),
+                entry(2),
+                entry(3),
+                entry(4),
+                entry(5),
+                entry(6),
+                entry(7),
+                entry(8),
+            ],
+        }
+    }
+}
+
+/// Walks 3.1 and 4.1. `None` if what follows could not be found by this header.
+pub(crate) fn check_header(check: &mut Check<'_, '_>, limits: &Limits) -> Option<Header> {
+    let length = check.bytes.len().min(u32::MAX as usize) as u32;
+    if !check.ensure(length >= HEADER_LENGTH, Rule::HeaderTooShort, 0, length) {
+        return None;
+    }
+    let head = [check.word_at(0), check.word_at(4)];
+    let magic = [
+        u32::from_le_bytes([MAGIC[0], MAGIC[1], MAGIC[2], MAGIC[3]]),
+        u32::from_le_bytes([MAGIC[4], MAGIC[5], MAGIC[6], MAGIC[7]]),
+    ];
+    if head != magic {
+        let second = head[0] == magic[0];
+        check.find(Rule::Magic, if second { 4 } else { 0 }, head[second as usize]);
+        return None;
+    }
+    let header = Header::read(|offset| check.word_at(offset));
+    let major = check.word_at(8) & 0xffff;
+    if !check.ensure(major == MAJOR_VERSION, Rule::MajorVersion, 8, major) {
+        return None;
+    }
+    let whole = header.file_length == length && length % 16 == 0 && check.bytes.len() as u64 <= 0xffff_fff0;
+    check.ensure(whole, Rule::FileLength, 12, header.file_length);
+    // At most 128 + 16 * 4096 bytes: no overflow.
+    let directory_end = HEADER_LENGTH.wrapping_add(ENTRY_LENGTH.wrapping_mul(header.section_count.min(4096)));
+    let counted = (1..=4096).contains(&header.section_count) && directory_end <= length;
+    if !check.ensure(counted, Rule::SectionCount, 24, header.section_count) {
+        return None;
+    }
+    let stated = check.word_at(124);
+    let fields = check.bytes.get(..124).unwrap_or(&[]);
+    let directory = check.bytes.get(128..directory_end as usize).unwrap_or(&[]);
+    let sum = crc32(crc32(0, fields), directory);
+    check.ensure(sum == stated, Rule::HeaderChecksum, 124, stated);
+    let known_content = header.content == CONTENT_MATERIAL || header.content == CONTENT_DICTIONARY;
+    let wanted =
+        if check.part == Part::Dictionary { header.content == CONTENT_DICTIONARY } else { known_content };
+    let mut sound = check.ensure(wanted, Rule::Content, 16, header.content);
+    let method = method_of(header.method);
+    sound &= check.ensure(method.is_some(), Rule::Method, 20, header.method);
+    for (offset, size) in [(32, header.width), (36, header.height)] {
+        sound &= check.ensure((1..=16_384).contains(&size), Rule::ImageSize, offset, size);
+    }
+    for (offset, count) in [(40, header.light_count), (44, header.view_count)] {
+        sound &= check.ensure((1..=1024).contains(&count), Rule::DirectionCount, offset, count);
+    }
+    let in_range = (1..=15).contains(&header.level_count);
+    let larger = header.width.max(header.height).min(16_384);
+    let needed =
+        header.level_count == 1 || in_range && level_size(larger, header.level_count.wrapping_sub(2)) > 1;
+    sound &= check.ensure(in_range && needed, Rule::LevelCount, 48, header.level_count);
+    let largest_edge = method.map_or(EDGE_LIMIT, |method| method.largest_edge);
+    sound &= check.ensure((1..=largest_edge).contains(&header.edge), Rule::BlockEdge, 52, header.edge);
+    sound &= check.ensure((1..=8).contains(&header.layer_count), Rule::LayerCount, 53, header.layer_count);
+    for (c, &state) in (0u32..).zip(&header.states) {
+        sound &= check.ensure(state <= CHANNEL_FULL, Rule::ChannelState, 56u32.wrapping_add(c), state);
+    }
+    let transfer_known = header.transfer == TRANSFER_LOG2 || header.transfer == TRANSFER_LINEAR;
+    check.ensure(transfer_known, Rule::Transfer, 60, header.transfer);
+    check.ensure(header.cosine_included <= 1, Rule::Transfer, 61, header.cosine_included);
+    let parameter = header.transfer_parameter;
+    let parameter_good = if header.transfer == TRANSFER_LINEAR {
+        (-60..=60).contains(&(parameter as i32))
+    } else {
+        parameter == 0 || (0x0080_0000..=0x3f80_0000).contains(&parameter)
+    };
+    check.ensure(parameter_good, Rule::TransferParameter, 64, parameter);
+    for (n, &entry) in (0u32..).zip(&header.matrix_q13) {
+        check.ensure(
+            entry != -32768,
+            Rule::ColourMatrix,
+            68u32.wrapping_add(n.wrapping_mul(2)),
+            entry as u32,
+        );
+    }
+    for (offset, unused) in [
+        (54, check.word_at(52) >> 16),
+        (59, check.word_at(56) >> 24),
+        (62, check.word_at(60) >> 16),
+        (86, check.word_at(84) >> 16),
+    ] {
+        check.ensure(unused == 0, Rule::HeaderReserved, offset, unused);
+    }
+    for index in 22u32..31 {
+        let found = check.word_at(index.wrapping_mul(4));
+        check.ensure(found == 0, Rule::HeaderReserved, index.wrapping_mul(4), found);
+    }
+    if header.content == CONTENT_DICTIONARY {
+        let plain = [
+            (28, 0, header.operations),
+            (32, 1, header.width),
+            (36, 1, header.height),
+            (48, 1, header.level_count),
+            (53, 1, header.layer_count),
+        ];
+        for (offset, wanted, found) in plain {
+            check.ensure(found == wanted, Rule::DictionaryHeader, offset, found);
+        }
+        for (c, &state) in (0u32..).zip(&header.states) {
+            check.ensure(state != 1, Rule::DictionaryHeader, 56u32.wrapping_add(c), state);
+        }
+        for index in 15u32..22 {
+            let found = check.word_at(index.wrapping_mul(4));
+            check.ensure(found == 0, Rule::DictionaryHeader, index.wrapping_mul(4), found);
+        }
+    }
+    // 4.1: the price is compared before anything beyond the directory is touched.
+    let affordable = check.ensure(length <= limits.bytes, Rule::LimitBytes, 12, length)
+        & check.ensure(header.operations <= limits.operations, Rule::LimitOperations, 28, header.operations);
+    // At most 2^28 where the sizes are sound.
+    let texels = header.width.saturating_mul(header.height);
+    let affordable = affordable & check.ensure(texels <= limits.texels, Rule::LimitTexels, 32, texels);
+    (sound && affordable && !check.stopped).then_some(header)
+}
