@@ -15,7 +15,8 @@ const SAMPLES: usize = 1 << 14;
 const REPEATS: usize = 5;
 
 fn main() {
-    let files: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with("--")).collect();
+    let files: Vec<String> =
+        std::env::args().skip(1).filter(|argument| !argument.starts_with("--")).collect();
     println!("file\tentry\tcompile_s\tus_a_sample");
     for file in &files {
         let bytes = std::fs::read(file).expect("a file");

@@ -10,7 +10,7 @@
 //! * `nested`: `M(M(c, u3), u4)` with a 31-bit coefficient, the same sums.
 //! * `flat`: `M(M(M(c, u12), u3), u4)`, one sum.
 
-use selvedge::fixed::{multiply_q15, round_shift};
+use selvedge::kernel::fixed::{multiply_q15, round_shift};
 use selvedge_tools::math::random::Random;
 use std::hint::black_box;
 use std::time::Instant;

@@ -212,13 +212,13 @@ fn main() {
         material.decode_channel(channel, 0, light, view, &mut scratch, &mut values).expect("buffers fit");
         for (i, value) in values.iter().enumerate() {
             let (x, y) = (i as u32 % width, i as u32 / width);
-            let whole = selvedge::interpolation::texel_values(
+            let whole = selvedge::kernel::interpolation::texel_values(
                 material.words(),
                 material.material(),
                 x,
                 y,
-                taps.0,
-                taps.1,
+                &taps.0,
+                &taps.1,
             );
             assert_eq!([whole.c0, whole.c1, whole.c2][channel], *value, "the image is not the plain path");
         }

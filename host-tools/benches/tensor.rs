@@ -7,7 +7,7 @@
 //! pairs of directions evaluates equation 2 by itself, from the same file's numbers in binary32, with colours
 //! side by side. Their directions are located beforehand, which is in their favour.
 
-use selvedge::position::axis_at_position;
+use selvedge::kernel::position::axis_at_position;
 use selvedge::{Direction, FilteredQuery, Limits, Rgb, Taps};
 use selvedge_tools::data::dataset::{Dataset, Sample};
 use selvedge_tools::encode::goal::Target;
@@ -56,7 +56,11 @@ impl Floats {
             let shifts = tensor.atoms[atom as usize];
             // 12.5 in floats: Q15 times the angular part, times eight, by all shifts, from Q20.
             let unit = 2f64.powi(3 - (shifts.angular + shifts.gain + layer.shift) as i32 - 20);
-            (atom, (selvedge::tensor::list_coefficient(value as u32, layer.value_bits) as f64 * unit) as f32)
+            (
+                atom,
+                (selvedge::method::sparse_tensor::list_coefficient(value as u32, layer.value_bits) as f64
+                    * unit) as f32,
+            )
         };
         let padded = |list: &Vec<(u32, u16)>| {
             let mut list: Vec<(u32, f32)> = list.iter().map(coefficient).collect();
@@ -176,8 +180,15 @@ fn measure(data: &Dataset, light_atoms: usize, abrdf_atoms: usize) {
         let (words, m) = (material.words(), material.material());
         let axis = |position: u32| axis_at_position(m.edge, m.edge_reciprocal_q18, m.width, position);
         let wanted = floats.filtered(query, light, view);
-        let got =
-            selvedge::tensor::textures_q20(words, m, 0, axis(query.u_q32), axis(query.v_q32), light, view);
+        let got = selvedge::method::sparse_tensor::textures_q20(
+            words,
+            m,
+            0,
+            axis(query.u_q32),
+            axis(query.v_q32),
+            light,
+            view,
+        );
         for (got, wanted) in [got.c0, got.c1, got.c2].into_iter().zip(wanted) {
             worst = worst.max((got as f64 / 1_048_576.0 - wanted as f64).abs());
             largest = largest.max(wanted.abs() as f64);

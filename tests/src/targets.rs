@@ -3,7 +3,7 @@
 //! The targets of `fuzz/` call them under libFuzzer, `soak` calls them without it, and the ordinary tests
 //! replay seeds and regressions.
 
-use selvedge::batch::FilteredQuery;
+use selvedge::FilteredQuery;
 use selvedge::{Direction, Finding, First, Limits, Part, Rgb, Selvedge};
 use selvedge_tools::check::count;
 use selvedge_tools::check::vectors::{Answer, Vector};
@@ -149,14 +149,14 @@ fn sample_all_paths(material: &Selvedge<'_>, seed: u64) {
             header.operations
         );
         let (light, view) = (material.locate_light(query.light), material.locate_view(query.view));
-        let values = selvedge::interpolation::filtered_values(
+        let values = selvedge::kernel::interpolation::filtered_values(
             material.words(),
             material.material(),
             level,
             query.u_q32,
             query.v_q32,
-            light,
-            view,
+            &light,
+            &view,
         );
         assert_eq!(
             counted.values,
@@ -164,7 +164,7 @@ fn sample_all_paths(material: &Selvedge<'_>, seed: u64) {
             "the count walks another way than the decoder"
         );
         let whole = material.trilinear(level << 16, query.u_q32, query.v_q32, query.light, query.view);
-        assert_eq!(selvedge::interpolation::radiance(material.material(), values, light), whole);
+        assert_eq!(selvedge::kernel::interpolation::radiance(material.material(), values, &light), whole);
     }
     material.trilinear(
         random.word() >> 12,
@@ -192,16 +192,19 @@ fn sample_all_paths(material: &Selvedge<'_>, seed: u64) {
         let (light, view) = (material.locate_light(light), material.locate_view(view));
         for _ in 0..4 {
             let (x, y) = (random.word() % width, random.word() % height);
-            let values = selvedge::interpolation::texel_values(
+            let values = selvedge::kernel::interpolation::texel_values(
                 material.words(),
                 material.material(),
                 x,
                 y,
-                light,
-                view,
+                &light,
+                &view,
             );
             let at = (y * width + x) as usize;
-            assert_eq!(selvedge::interpolation::radiance(material.material(), values, light), image[at]);
+            assert_eq!(
+                selvedge::kernel::interpolation::radiance(material.material(), values, &light),
+                image[at]
+            );
             assert_eq!(
                 [values.c0, values.c1, values.c2],
                 [channels[0][at], channels[1][at], channels[2][at]]
@@ -362,7 +365,8 @@ pub fn paths(data: &[u8]) {
     material.sample_batch(&queries, &mut scratch, &mut out).expect("buffers fit");
     for (query, rgb) in queries.iter().zip(&out) {
         assert_eq!(material.filtered(query.u_q32, query.v_q32, query.light, query.view), *rgb, "{query:?}");
-        for taps in [material.locate_light(query.light), material.locate_view(query.view)] {
+        for located in [material.locate_light(query.light), material.locate_view(query.view)] {
+            let taps = located.taps;
             assert_eq!(taps.weight_a_q15 + taps.weight_b_q15 + taps.weight_c_q15, 32_768);
             assert!(
                 taps.weight_a_q15 >= 0

@@ -1,7 +1,7 @@
 //! Blends meet both materials at their ends, and the mean of what both decode to in the middle.
 
 use proptest::prelude::*;
-use selvedge::interpolation::{VALUE_BOUND, filtered_values};
+use selvedge::kernel::interpolation::{VALUE_BOUND, filtered_values};
 use selvedge::{Direction, Limits, Selvedge, Values};
 use selvedge_tests::setting;
 use selvedge_tools::check::extreme::extreme;
@@ -18,7 +18,6 @@ use selvedge_tools::methods::sparse_ensemble::model::{
     ensembles, ensembles_mut,
 };
 use selvedge_tools::methods::sparse_ensemble::quantise::{FloatRecord, quantise};
-use std::path::Path;
 
 fn excerpt() -> MaterialModel {
     let file = std::fs::read(selvedge_tests::excerpt_file()).expect("excerpt");
@@ -55,7 +54,7 @@ fn values(material: &Selvedge<'_>, random: &mut Random) -> [i32; 3] {
     };
     let (light, view) = (material.locate_light(direction()), material.locate_view(direction()));
     let level = r.range(0, material.header().level_count as i64 - 1) as u32;
-    as_array(filtered_values(material.words(), material.material(), level, r.word(), r.word(), light, view))
+    as_array(filtered_values(material.words(), material.material(), level, r.word(), r.word(), &light, &view))
 }
 
 /// The largest difference, Q20, of a blend to the blend of what both decode to; values at the bound, where
@@ -238,7 +237,7 @@ proptest! {
                         let found = record.coefficients.iter().find(|c| c.0 as usize == place).expect("in the record").1;
                         let atom = atoms[*dictionary][place];
                         let unit = 2f64.powi((record.shift + 5 + atom.shift) as i32);
-                        let decoded = selvedge::ensemble::dequantise(atom.quantiser(), found as u32, bits) as f64 / unit;
+                        let decoded = selvedge::method::sparse_ensemble::dequantise(atom.quantiser(), found as u32, bits) as f64 / unit;
                         let step = atom.step as f64 / 2f64.powi(bits as i32);
                         prop_assert!((decoded - value).abs() <= (step / 2.0 + 1.5) / unit, "{} {} {}", decoded, value, step / unit);
                     }

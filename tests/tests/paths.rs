@@ -1,7 +1,7 @@
 //! Every path to a value gives the same bits: one texel at a time, whole images, batches; layers, levels.
 
 use proptest::prelude::*;
-use selvedge::batch::FilteredQuery;
+use selvedge::FilteredQuery;
 use selvedge::{Direction, Limits, Rgb, Selvedge};
 use selvedge_tools::check::extreme::extreme_of_any_method;
 use selvedge_tools::format::texture::Kept;
@@ -44,15 +44,15 @@ fn image_equals_plain(material: &Selvedge<'_>, random: &mut Random) {
     let mut image = vec![Rgb::default(); (width * height) as usize];
     material.decode_image(0, light, view, &mut scratch, &mut image).expect("buffers fit");
     for (i, rgb) in (0u32..).zip(&image) {
-        let values = selvedge::interpolation::texel_values(
+        let values = selvedge::kernel::interpolation::texel_values(
             material.words(),
             material.material(),
             i % width,
             i / width,
-            light_taps,
-            view_taps,
+            &light_taps,
+            &view_taps,
         );
-        assert_eq!(selvedge::interpolation::radiance(material.material(), values, light_taps), *rgb);
+        assert_eq!(selvedge::kernel::interpolation::radiance(material.material(), values, &light_taps), *rgb);
     }
 }
 
@@ -112,7 +112,7 @@ proptest! {
         let mut random = Random::new(seed);
         for _ in 0..200 {
             let asked = direction(&mut random);
-            let taps = material.locate_light(asked);
+            let taps = material.locate_light(asked).taps;
             prop_assert_eq!(taps.weight_a_q15 + taps.weight_b_q15 + taps.weight_c_q15, 32_768);
             prop_assert!([taps.weight_a_q15, taps.weight_b_q15, taps.weight_c_q15].iter().all(|w| (0..=32_768).contains(w)));
             prop_assert!([taps.a, taps.b, taps.c].iter().all(|&i| i < material.header().light_count));
@@ -141,7 +141,7 @@ proptest! {
             let strictly = triangles.iter().filter(|t| sides(t).iter().all(|&s| s > 0)).count();
             let touched = triangles.iter().filter(|t| sides(t).iter().all(|&s| s >= 0)).count();
             prop_assert!(strictly <= 1 && (strictly == 0 || touched == 1), "{} {}", strictly, touched);
-            let taps = material.locate_light(asked);
+            let taps = material.locate_light(asked).taps;
             if touched > 0 {
                 // Continuity: whichever triangle answers, its weights give the place back, so neighbours agree along their side.
                 let weights = [(taps.a, taps.weight_a_q15), (taps.b, taps.weight_b_q15), (taps.c, taps.weight_c_q15)];
@@ -175,7 +175,7 @@ fn sample_directions_are_found() {
         for (i, &[x, y]) in model.lights.iter().enumerate() {
             let asked = material.light_direction(i as u32);
             assert_eq!([asked.x_q18, asked.y_q18], [x << 4, y << 4]);
-            let taps = material.locate_light(asked);
+            let taps = material.locate_light(asked).taps;
             let weight: i32 =
                 [(taps.a, taps.weight_a_q15), (taps.b, taps.weight_b_q15), (taps.c, taps.weight_c_q15)]
                     .iter()
@@ -199,7 +199,7 @@ fn the_place_on_the_hull_is_the_nearest() {
         for _ in 0..200 {
             let asked = direction(&mut random);
             let p = [asked.x_q18, asked.y_q18].map(|c| c.clamp(-262_144, 262_144) as f64 / 16.0);
-            let taps = material.locate_light(asked);
+            let taps = material.locate_light(asked).taps;
             let at = |i: u32| model.lights[i as usize].map(|c| c as f64);
             let blend: [f64; 2] = std::array::from_fn(|c| {
                 (at(taps.a)[c] * taps.weight_a_q15 as f64
@@ -242,7 +242,7 @@ fn filtered_samples_meet_point_samples() {
             let (l, v) = (material.locate_light(at(light)), material.locate_view(at(view)));
             // The centre of texel (0, 1) of 3 x 2, where the fractions of u and v are exactly representable:
             // v.
-            let values = material.filtered_values(((1u64 << 32) / 6 + 1) as u32, 0xc000_0000, l, v);
+            let values = material.filtered_values(((1u64 << 32) / 6 + 1) as u32, 0xc000_0000, &l, &v);
             let point = material.point_values(0, 1, light, view);
             assert!((values.c0 - point.c0).abs() <= 200 && values.c1 == point.c1, "{values:?} {point:?}");
         }

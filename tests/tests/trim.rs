@@ -1,7 +1,8 @@
 //! Reading a file back gives its bytes, and what is trimmed decodes to the bits of the whole.
 
 use proptest::prelude::*;
-use selvedge::interpolation::{filtered_values, trilinear_values};
+use selvedge::kernel::interpolation::filtered_values;
+use selvedge::kernel::levels::trilinear_values;
 use selvedge::{Direction, Limits, Rule, Selvedge, Values};
 use selvedge_tests::setting;
 use selvedge_tools::check::extreme::{extreme, extreme_of_any_method};
@@ -13,7 +14,6 @@ use selvedge_tools::math::random::Random;
 use selvedge_tools::methods::read::{model_of, read_model, same_triangles};
 use selvedge_tools::methods::sparse_ensemble;
 use selvedge_tools::methods::sparse_ensemble::example::example_model;
-use std::path::Path;
 
 fn excerpt() -> Vec<u8> {
     std::fs::read(selvedge_tests::excerpt_file()).expect("excerpt")
@@ -116,29 +116,29 @@ fn hold_trim(model: &MaterialModel, options: &Trim, random: &mut Random, count: 
         let located = |material: &Selvedge<'_>| (material.locate_light(light), material.locate_view(view));
         let ((l, v), (whole_l, whole_v)) = (located(&trimmed), located(&whole));
         let renumbered = [
-            lights[l.a as usize],
-            lights[l.b as usize],
-            lights[l.c as usize],
-            l.weight_a_q15 as u32,
-            l.weight_b_q15 as u32,
-            l.cosine_q15 as u32,
+            lights[l.taps.a as usize],
+            lights[l.taps.b as usize],
+            lights[l.taps.c as usize],
+            l.taps.weight_a_q15 as u32,
+            l.taps.weight_b_q15 as u32,
+            l.taps.cosine_q15 as u32,
         ];
         let wanted = [
-            whole_l.a,
-            whole_l.b,
-            whole_l.c,
-            whole_l.weight_a_q15 as u32,
-            whole_l.weight_b_q15 as u32,
-            whole_l.cosine_q15 as u32,
+            whole_l.taps.a,
+            whole_l.taps.b,
+            whole_l.taps.c,
+            whole_l.taps.weight_a_q15 as u32,
+            whole_l.taps.weight_b_q15 as u32,
+            whole_l.taps.cosine_q15 as u32,
         ];
         assert_eq!(renumbered, wanted, "{light:?}");
         let level = random.range(0, left.level_count as i64 - 1) as u32;
         let at = |m: &Selvedge<'_>, l, v| filtered_values(m.words(), m.material(), level, u_q32, v_q32, l, v);
-        same(at(&trimmed, l, v), at(&whole, whole_l, whole_v), "filtered");
+        same(at(&trimmed, &l, &v), at(&whole, &whole_l, &whole_v), "filtered");
         let level_q16 = random.range(0, ((left.level_count as i64 - 1) << 16).max(0)) as u32;
         let between =
             |m: &Selvedge<'_>, l, v| trilinear_values(m.words(), m.material(), level_q16, u_q32, v_q32, l, v);
-        same(between(&trimmed, l, v), between(&whole, whole_l, whole_v), "between levels");
+        same(between(&trimmed, &l, &v), between(&whole, &whole_l, &whole_v), "between levels");
         if keeps_all {
             assert_eq!(
                 trimmed.filtered(u_q32, v_q32, light, view),
@@ -224,6 +224,9 @@ fn the_hull_begins_where_it_did() {
         let asked = Direction { x_q18, y_q18, z_q15: 20_000 };
         let files = [&model, &left].map(write_material);
         let [whole, trimmed] = files.each_ref().map(|file| open(file).locate_light(asked));
+        let point = |located: &selvedge::Located| [located.clamped_x_q18, located.clamped_y_q18];
+        assert_eq!(point(&trimmed), point(&whole), "seed {seed}");
+        let (trimmed, whole) = (trimmed.taps, whole.taps);
         assert_eq!([trimmed.a, trimmed.b].map(|i| kept[i as usize]), [whole.a, whole.b], "seed {seed}");
         assert_eq!((trimmed.weight_b_q15, trimmed.cosine_q15), (whole.weight_b_q15, whole.cosine_q15));
     }

@@ -6,14 +6,14 @@
 
 use crate::methods;
 use crate::methods::sample::SampleAt;
-use selvedge::direction::{
+use selvedge::kernel::direction::{
     clamp_direction, coarse_q14, cross, grid_cell, grid_start, point, triangles_start,
 };
-use selvedge::fixed::clamp_magnitude;
-use selvedge::interpolation::{VALUE_BOUND, mean_q20, scale_q15, scale_texture};
-use selvedge::material::{CHANNEL_FULL, CHANNEL_MISSING, level_size};
-use selvedge::position::axis_at_position;
-use selvedge::words::{high_i16, low_i16, word};
+use selvedge::kernel::fixed::clamp_magnitude;
+use selvedge::kernel::interpolation::{VALUE_BOUND, mean_q20, scale_q15, scale_texture};
+use selvedge::kernel::material::{CHANNEL_FULL, CHANNEL_MISSING, level_size};
+use selvedge::kernel::position::{Place, axis_at_position};
+use selvedge::kernel::words::{high_i16, low_i16, word};
 use selvedge::{Direction, Finding, Selvedge, Values};
 
 /// Both axes.
@@ -60,7 +60,7 @@ pub fn filtered(
     let axis =
         |size: u32, at: u32| axis_at_position(m.edge, m.edge_reciprocal_q18, level_size(size, level), at);
     let (x, y) = (axis(m.width, u_q32), axis(m.height, v_q32));
-    let at = SampleAt { level, x, y, light, view };
+    let at = SampleAt { place: Place { level, x, y }, light, view };
     let none = Values::default();
     let textures = if m.full_count > 0 { (method.count)(opened, &at, &mut operations) } else { none };
     let mut textures = [textures.c0, textures.c1, textures.c2].into_iter();
@@ -72,11 +72,11 @@ pub fn filtered(
         let mut mean = 0;
         if channel.mean_start != 0 {
             operations += OF_MEAN;
-            mean = mean_q20(words, m, channel, light, view);
+            mean = mean_q20(words, m, channel, light.taps, view.taps);
         }
         if channel.state == CHANNEL_FULL && channel.scale_start != 0 {
             operations += OF_SCALE;
-            let scale = scale_q15(words, m, channel, light, view);
+            let scale = scale_q15(words, m, channel, light.taps, view.taps);
             texture = scale_texture(texture, scale, word(words, channel.scale_start + 1));
         }
         clamp_magnitude(texture.wrapping_add(mean), VALUE_BOUND)

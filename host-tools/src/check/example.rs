@@ -1,6 +1,6 @@
 //! Files of examples as the specification shows them: sections by name, bytes in hexadecimal.
 
-use selvedge::header::{ENTRY_LENGTH, HEADER_LENGTH};
+use selvedge::container::header::{ENTRY_LENGTH, HEADER_LENGTH};
 
 /// The parts of a legal file by name: header, directory, and each section as kind and instance in hex.
 pub fn parts(file: &[u8]) -> Vec<(String, Vec<u8>, usize)> {

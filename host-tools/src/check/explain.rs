@@ -6,11 +6,11 @@
 use crate::format::units::{ONE_Q15, ONE_Q20};
 use crate::methods;
 use crate::methods::sample::{Explained, SampleAt};
-use selvedge::direction::{Direction, Taps};
-use selvedge::interpolation::{mean_q20, radiance, scale_q15, texel_values};
-use selvedge::material::{CHANNEL_FULL, Channel};
-use selvedge::position::{axis_at_texel, block_count};
-use selvedge::words::word;
+use selvedge::kernel::direction::{Direction, Taps};
+use selvedge::kernel::interpolation::{mean_q20, radiance, scale_q15, texel_values};
+use selvedge::kernel::material::{CHANNEL_FULL, Channel};
+use selvedge::kernel::position::{Place, axis_at_texel, block_count};
+use selvedge::kernel::words::word;
 use selvedge::{Finding, Selvedge};
 use serde::Serialize;
 
@@ -74,18 +74,18 @@ pub fn explain(
     let axis = |at: u32| axis_at_texel(material.edge, material.edge_reciprocal_q18, at);
     let [x, y] = texel.map(axis);
     let (light, view) = (opened.locate_light(light), opened.locate_view(view));
-    let at = SampleAt { level: 0, x, y, light, view };
-    let values = texel_values(words, material, texel[0], texel[1], light, view);
+    let at = SampleAt { place: Place { level: 0, x, y }, light, view };
+    let values = texel_values(words, material, texel[0], texel[1], &light, &view);
     let channels = material.channels.iter().zip([values.c0, values.c1, values.c2]);
     Ok(Explanation {
         texel,
         block: y.first.block * block_count(material, material.width) + x.first.block,
         in_block: texel.map(|at| at % material.edge),
-        light: tap_list(light),
-        view: tap_list(view),
+        light: tap_list(light.taps),
+        view: tap_list(view.taps),
         channels: channels.map(|(channel, value)| channel_report(opened, *channel, value, &at)).collect(),
         texture: (material.full_count > 0).then(|| (method.explain)(opened, &at)),
-        radiance: radiance(material, values, light).to_f32(),
+        radiance: radiance(material, values, &light).to_f32(),
     })
 }
 
@@ -93,12 +93,12 @@ fn channel_report(opened: &Selvedge<'_>, channel: Channel, value_q20: i32, at: &
     let (material, words) = (opened.material(), opened.words());
     let mean = match channel.mean_start {
         0 => 0.0,
-        _ => mean_q20(words, material, channel, at.light, at.view) as f64 / ONE_Q20,
+        _ => mean_q20(words, material, channel, at.light.taps, at.view.taps) as f64 / ONE_Q20,
     };
     let scaled = channel.state == CHANNEL_FULL && channel.scale_start != 0;
     let scale = || {
         let unit = 2f64.powi(word(words, channel.scale_start + 1) as i32);
-        scale_q15(words, material, channel, at.light, at.view) as f64 / ONE_Q15 * unit
+        scale_q15(words, material, channel, at.light.taps, at.view.taps) as f64 / ONE_Q15 * unit
     };
     let (scale, value) = (scaled.then(scale), value_q20 as f64 / ONE_Q20);
     ChannelReport { state: channel.state, mean, scale, value, value_q20 }

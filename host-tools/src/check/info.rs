@@ -3,7 +3,7 @@
 use crate::format::bits::hex;
 use crate::methods;
 use crate::methods::method::Method;
-use selvedge::directory::{DIRECTIONS, EXTERNAL, MEANS, METADATA, OPTIONAL, SCALES};
+use selvedge::container::directory::{DIRECTIONS, EXTERNAL, MEANS, METADATA, OPTIONAL, SCALES};
 use selvedge::{Finding, Selvedge};
 use serde::Serialize;
 

@@ -5,7 +5,7 @@ use crate::error::{Result, ToolError};
 use crate::files;
 use crate::methods::read;
 use clap::Args;
-use selvedge::header::CONTENT_DICTIONARY;
+use selvedge::container::header::CONTENT_DICTIONARY;
 use selvedge::{Limits, Selvedge};
 use std::path::{Path, PathBuf};
 

@@ -38,8 +38,8 @@ pub fn run(args: Arguments) -> Result<u8> {
             let [width, height] = size;
             return Err(ToolError::Usage(format!("--texel: the image has {width} x {height} texels")));
         }
-        let explanation = explain::explain(&material, texel, args.light, args.view)
-            .map_err(invalid(&args.source))?;
+        let explanation =
+            explain::explain(&material, texel, args.light, args.view).map_err(invalid(&args.source))?;
         if args.json {
             print_json(&explanation)?
         } else {

@@ -146,7 +146,7 @@ fn import_data(from: &Path, kind: Kind, output: &Path, args: DataArgs) -> Result
         ("--licence", &args.licence),
     ];
     if let Some((option, _)) =
-        texts.iter().find(|(_, text)| text.chars().any(selvedge::metadata::is_invisible))
+        texts.iter().find(|(_, text)| text.chars().any(selvedge::container::metadata::is_invisible))
     {
         return Err(ToolError::Usage(format!(
             "{option}: a character that is not seen, which no file may have"

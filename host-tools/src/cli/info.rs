@@ -1,9 +1,9 @@
 //! `info`: what a file, a dataset or third-party data are.
 
 use super::common::{FileArgs, invalid, print, print_json, with_material};
+use crate::check::info;
 use crate::error::Result;
 use crate::foreign::{self, Kind};
-use crate::check::info;
 use clap::Args;
 use std::path::Path;
 

@@ -128,11 +128,18 @@ pub fn main() -> ExitCode {
         Ok(code) => ExitCode::from(code),
         Err(error) => {
             // Names inside third-party files may hold control sequences of a terminal.
-            let words: String = error
-                .to_string()
-                .chars()
-                .map(|c| if c != '\n' && selvedge::metadata::is_invisible(c) { '\u{fffd}' } else { c })
-                .collect();
+            let words: String =
+                error
+                    .to_string()
+                    .chars()
+                    .map(|c| {
+                        if c != '\n' && selvedge::container::metadata::is_invisible(c) {
+                            '\u{fffd}'
+                        } else {
+                            c
+                        }
+                    })
+                    .collect();
             eprintln!("selvedge: {words}");
             ExitCode::from(error.exit_code())
         }

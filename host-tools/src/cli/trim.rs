@@ -1,12 +1,12 @@
 //! `trim`: leaves out what a scene does not need.
 
-use super::common::{invalid, FileArgs, with_material};
+use super::common::{FileArgs, invalid, with_material};
 use crate::error::{Result, ToolError};
 use crate::files;
-use crate::methods::read;
 use crate::format::sector::Sector;
 use crate::format::trim::{Keep, Trim, trim};
 use crate::format::write;
+use crate::methods::read;
 use clap::Args;
 use std::path::PathBuf;
 

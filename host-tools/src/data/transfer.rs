@@ -103,9 +103,10 @@ mod tests {
                 let m = matrix_q13().map(i32::from);
                 for c in 0..3 {
                     let values = selvedge::Values { c0: q20[0], c1: q20[1], c2: q20[2] };
-                    let row = selvedge::colour::matrix_row(m[3 * c], m[3 * c + 1], m[3 * c + 2], values)
-                        as f64
-                        / 1_048_576.0;
+                    let row =
+                        selvedge::kernel::colour::matrix_row(m[3 * c], m[3 * c + 1], m[3 * c + 2], values)
+                            as f64
+                            / 1_048_576.0;
                     let back = match transfer {
                         TransferModel::Log2 { offset } => row.exp2() - offset as f64,
                         TransferModel::Linear { exponent } => row * (exponent as f64).exp2(),

@@ -91,7 +91,7 @@ impl ImportOptions {
 /// A text of others as a file may have it (3.4-3): without what is not seen, and not long.
 pub fn clean(text: &str) -> String {
     text.chars()
-        .filter(|&c| !selvedge::metadata::is_invisible(c))
+        .filter(|&c| !selvedge::container::metadata::is_invisible(c))
         .take(200)
         .collect::<String>()
         .trim()
@@ -155,7 +155,7 @@ pub fn detect(path: &Path) -> Result<Kind> {
         .take(64)
         .read_to_end(&mut start)
         .map_err(ToolError::io(path))?;
-    if start.starts_with(&selvedge::header::MAGIC) {
+    if start.starts_with(&selvedge::container::header::MAGIC) {
         Ok(if is_dictionary(&start) { Kind::Dictionary } else { Kind::Material })
     } else if Dataset::is_one(path) {
         Ok(Kind::Dataset)

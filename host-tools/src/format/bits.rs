@@ -1,6 +1,6 @@
 //! Numbers packed into words, and streams of bits, lowest first.
 
-use selvedge::words::{Words, packed_i16};
+use selvedge::kernel::words::{Words, packed_i16};
 
 /// Words in the byte order of the file.
 pub fn words_to_bytes(words: &[u32]) -> Vec<u8> {

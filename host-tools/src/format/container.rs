@@ -1,8 +1,8 @@
 //! The container (chapters 3.1 and 3.2): header words, sections laid out, checksums, and the way back.
 
 use crate::format::bits::words_to_bytes;
+use selvedge::container::header::{CONTENT_DICTIONARY, ENTRY_LENGTH, HEADER_LENGTH, MAGIC};
 use selvedge::crc32;
-use selvedge::header::{CONTENT_DICTIONARY, ENTRY_LENGTH, HEADER_LENGTH, MAGIC};
 
 /// Words of a header.
 pub const HEADER_WORDS: usize = HEADER_LENGTH as usize / 4;

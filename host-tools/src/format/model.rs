@@ -4,7 +4,7 @@
 //! [`crate::format::write`] turns it into bytes. All numbers have the meaning of the specification.
 
 use crate::format::texture::Texture;
-use selvedge::material::{CHANNEL_FULL, CHANNEL_MEAN, CHANNEL_MISSING};
+use selvedge::kernel::material::{CHANNEL_FULL, CHANNEL_MEAN, CHANNEL_MISSING};
 use serde::{Deserialize, Serialize};
 
 /// A whole material.

@@ -15,7 +15,7 @@ use crate::error::{Result, ToolError};
 use crate::format::triangulate::{Triangulation, triangulate};
 use crate::format::units::ONE_Q14;
 use selvedge::Direction;
-use selvedge::direction::{cross, dot_product};
+use selvedge::kernel::direction::{cross, dot_product};
 
 /// What the sector is widened by, Q14: more than the rounding of a query to its coarse point (5.4-6).
 const MARGIN: f64 = 2.0;

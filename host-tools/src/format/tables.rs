@@ -3,7 +3,7 @@
 use crate::error::{Result, ToolError};
 use crate::format::model::PairTableModel;
 use crate::format::units::{LARGEST_ENTRY, ONE_Q15, ONE_Q20};
-use selvedge::pair_table::{BASE_BOUND, MEAN_SHIFT_LIMIT, SCALE_SHIFT_LIMIT};
+use selvedge::container::pair_table::{BASE_BOUND, MEAN_SHIFT_LIMIT, SCALE_SHIFT_LIMIT};
 
 /// Largest scale of a shift, so that its entry is not clipped.
 const LARGEST_SCALE: f64 = 0.999;

@@ -4,7 +4,7 @@
 //! empty circle it has a larger face, which is split as a fan from its lowest direction.
 
 use crate::format::units::ONE_Q14;
-use selvedge::direction_set::{cell_range, meets_cell};
+use selvedge::container::directions::{cell_range, meets_cell};
 use spade::{DelaunayTriangulation, Point2, Triangulation as _};
 use std::collections::BTreeMap;
 
@@ -173,7 +173,7 @@ mod tests {
     use super::*;
 
     fn cross(a: [i32; 2], b: [i32; 2], p: [i32; 2]) -> i32 {
-        selvedge::direction::cross(a[0], a[1], b[0], b[1], p[0], p[1])
+        selvedge::kernel::direction::cross(a[0], a[1], b[0], b[1], p[0], p[1])
     }
 
     fn is_collinear(points: &[[i32; 2]]) -> bool {

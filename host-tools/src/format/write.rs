@@ -4,13 +4,13 @@ use crate::format::bits::{pack_rows, words_to_bytes};
 use crate::format::container::{HEADER_WORDS, RawSection, header_word, lay_out};
 use crate::format::model::{ChannelModel, MaterialModel, MetadataModel, PairTableModel, TransferModel};
 use crate::format::triangulate::{Triangulation, triangulate};
-use selvedge::cost::{Shape, filtered_operations};
-use selvedge::direction::{cross, dot_product};
-use selvedge::direction_set::{cosine_of, reciprocal_of};
-use selvedge::directory::{DIRECTIONS, EXTERNAL, MEANS, METADATA, SCALES};
-use selvedge::header::{CONTENT_DICTIONARY, CONTENT_MATERIAL, MAJOR_VERSION};
-use selvedge::material::{CHANNEL_FULL, CHANNEL_MISSING, TRANSFER_LINEAR, TRANSFER_LOG2};
+use selvedge::container::directions::{cosine_of, reciprocal_of};
+use selvedge::container::directory::{DIRECTIONS, EXTERNAL, MEANS, METADATA, SCALES};
+use selvedge::container::header::{CONTENT_DICTIONARY, CONTENT_MATERIAL, MAJOR_VERSION};
+use selvedge::kernel::direction::{cross, dot_product};
+use selvedge::kernel::material::{CHANNEL_FULL, CHANNEL_MISSING, TRANSFER_LINEAR, TRANSFER_LOG2};
 use selvedge::sha256;
+use selvedge::walk::cost::{Shape, filtered_operations};
 
 /// Bit of the layers in their word, and of the cosine flag in that of the transfer.
 const SECOND_BYTE: u32 = 8;

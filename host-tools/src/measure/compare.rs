@@ -10,7 +10,7 @@ use crate::error::{Result, ToolError};
 use crate::format::triangulate::project;
 use crate::math::linear::ordered;
 use crate::measure::baseline::decoder::{Decoder, Locator};
-use selvedge::direction_set::cosine_of;
+use selvedge::container::directions::cosine_of;
 use selvedge::{Direction, Rgb, Selvedge};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::LN_2;

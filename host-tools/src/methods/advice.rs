@@ -1,7 +1,7 @@
 //! Advice on legal files: what methods share of it.
 
 use selvedge::Selvedge;
-use selvedge::directory::EXTERNAL;
+use selvedge::container::directory::EXTERNAL;
 
 /// Something that a file had better not have.
 #[derive(Debug, PartialEq, Eq)]

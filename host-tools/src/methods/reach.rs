@@ -5,9 +5,9 @@
 
 use crate::format::model::{ChannelModel, MaterialModel, MetadataModel, PairTableModel, TransferModel};
 use crate::math::random::Random;
-use selvedge::direction::ONE_Q14;
-use selvedge::material::level_size;
-use selvedge::pair_table::{BASE_BOUND, MEAN_SHIFT_LIMIT, SCALE_SHIFT_LIMIT};
+use selvedge::container::pair_table::{BASE_BOUND, MEAN_SHIFT_LIMIT, SCALE_SHIFT_LIMIT};
+use selvedge::kernel::direction::ONE_Q14;
+use selvedge::kernel::material::level_size;
 use std::collections::BTreeSet;
 
 /// How large the models grow. It cuts counts, so every branch and every end of a *value* is within any reach.

@@ -9,10 +9,10 @@ use crate::format::bits::packed_rows;
 use crate::format::model::{ChannelModel, MaterialModel, MetadataModel, PairTableModel, TransferModel};
 use crate::format::triangulate::triangulate;
 use crate::methods::registry;
-use selvedge::direction::{hull_start, point, triangles_start};
-use selvedge::directory::OPTIONAL;
-use selvedge::material::{Channel, TRANSFER_LINEAR};
-use selvedge::words::{Words, high_i16, low_i16, word};
+use selvedge::container::directory::OPTIONAL;
+use selvedge::kernel::direction::{hull_start, point, triangles_start};
+use selvedge::kernel::material::{Channel, TRANSFER_LINEAR};
+use selvedge::kernel::words::{Words, high_i16, low_i16, word};
 use selvedge::{Finding, Limits, Section, Selvedge};
 
 /// Words in front of the rows of a table for pairs (8.1-5).

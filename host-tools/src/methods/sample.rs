@@ -1,7 +1,7 @@
 //! A sample on its way into a method, and what a method says of it.
 
-use selvedge::Taps;
-use selvedge::position::{Axis, Span};
+use selvedge::Located;
+use selvedge::kernel::position::{Axis, Place, Span};
 use serde::{Serialize, Serializer};
 use serde_json::Value;
 use std::fmt::Debug;
@@ -9,16 +9,12 @@ use std::fmt::Debug;
 /// What a method is asked: a place on a level, and located directions.
 #[derive(Clone, Copy, Debug)]
 pub struct SampleAt {
-    /// Level of detail.
-    pub level: u32,
-    /// Blocks along x.
-    pub x: Axis,
-    /// Blocks along y.
-    pub y: Axis,
+    /// Level of detail, and texels along both axes.
+    pub place: Place,
     /// The light.
-    pub light: Taps,
+    pub light: Located,
     /// The view.
-    pub view: Taps,
+    pub view: Located,
 }
 
 /// The one or two blocks of an axis (6.2).

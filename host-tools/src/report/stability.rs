@@ -22,13 +22,15 @@ use crate::methods::sparse_ensemble::encode::{self, prepare};
 use crate::methods::sparse_tensor;
 use crate::methods::sparse_tensor::encode::fit;
 use glam::DVec3;
-use selvedge::colour::{transfer_linear, transfer_log2};
-use selvedge::fixed::{exp2_q31, multiply_q13, multiply_q15, round_shift};
-use selvedge::position::axis_at_position;
-use selvedge::tensor::{
-    LIST_END, angular_q15, blend_light, corner_weight, lists_start, next_coefficient, open_list,
+use selvedge::kernel::colour::{transfer_linear, transfer_log2};
+use selvedge::kernel::fixed::{exp2_q31, multiply_q13, multiply_q15, round_shift};
+use selvedge::kernel::material::part;
+use selvedge::kernel::position::axis_at_position;
+use selvedge::kernel::words::word;
+use selvedge::method::sparse_tensor::{
+    FIBRES_PART, LIGHT_ATOMS_PART, LIST_END, angular_q15, blend_light, corner_weight, lists_start,
+    next_coefficient, open_list,
 };
-use selvedge::words::word;
 use selvedge::{Direction, Limits, Selvedge, Taps};
 use serde::Serialize;
 use std::path::Path;
@@ -340,7 +342,7 @@ fn weights() -> Vec<Case> {
                         },
                         _ => direction(upward(&mut random)),
                     };
-                    measured = measured.max(weight_defect(file.locate_light(asked)));
+                    measured = measured.max(weight_defect(file.locate_light(asked).taps));
                 }
                 Ok(Outcome { condition, bound: 0.0, measured })
             },
@@ -391,7 +393,7 @@ fn directions_at_ends() -> Vec<Case> {
                     let azimuth = i as f64 * 0.5;
                     let at = |polar: f64| direction(directions::from_degrees(polar, azimuth));
                     for below in [90.1, 95.0, 120.0, 179.0] {
-                        let (a, b) = (file.locate_view(at(90.0)), file.locate_view(at(below)));
+                        let (a, b) = (file.locate_view(at(90.0)).taps, file.locate_view(at(below)).taps);
                         // The place on the hull's edge that is nearest to the point on the disc's border.
                         measured = measured.max(weight_defect(b));
                         if below < 91.0 {
@@ -441,7 +443,7 @@ fn continuity(folder: &Path, tensor: bool, what: &str) -> Result<Outcome> {
         * 16.0;
     let step_of_weight = if what == "position" { 1024.0 * 6.0 / 2f64.powi(17) } else { 32_768.0 / least };
     let values = |u: u32, v: u32, light: Direction, view: Direction| {
-        let found = file.filtered_values(u, v, file.locate_light(light), file.locate_view(view));
+        let found = file.filtered_values(u, v, &file.locate_light(light), &file.locate_view(view));
         [found.c0, found.c1, found.c2].map(f64::from)
     };
     let mut random = Random::new(7);
@@ -532,8 +534,8 @@ fn largest_legal() -> Vec<Case> {
                     let file = opened(&bytes)?;
                     for _ in 0..if file.material().full_count > 0 { 200 } else { 0 } {
                         let (light, view) = (
-                            file.locate_light(direction(upward(&mut random))),
-                            file.locate_view(direction(upward(&mut random))),
+                            file.locate_light(direction(upward(&mut random))).taps,
+                            file.locate_view(direction(upward(&mut random))).taps,
                         );
                         measured = measured.max(largest_layer_sum(
                             &file,
@@ -580,7 +582,7 @@ fn largest_legal() -> Vec<Case> {
 /// of all atoms, added in wide integers.
 fn largest_layer_sum(file: &Selvedge<'_>, position: [u32; 2], light: Taps, view: Taps) -> f64 {
     let (words, m) = (file.words(), file.material());
-    let atoms = word(words, m.fibres_start);
+    let atoms = word(words, part(m, FIBRES_PART));
     let ends = |size: u32, at: u32| {
         let axis = axis_at_position(m.edge, m.edge_reciprocal_q18, size, at);
         let whole = [(axis.first.block, 32_768)].to_vec();
@@ -609,7 +611,7 @@ fn largest_layer_sum(file: &Selvedge<'_>, position: [u32; 2], light: Taps, view:
         let mut sums = [0i64; 3];
         for (atom, (weight, magnitude)) in weights {
             largest = largest.max(magnitude);
-            let shifts = word(words, m.fibres_start + 2 + atom);
+            let shifts = word(words, part(m, FIBRES_PART) + 2 + atom);
             let found = angular_q15(words, m, atom, shifts & 31, light, view);
             for (sum, angular) in sums.iter_mut().zip([found.c0, found.c1, found.c2]) {
                 *sum +=
@@ -628,9 +630,9 @@ fn largest_fibre_sum(file: &Selvedge<'_>) -> f64 {
     if m.full_count == 0 {
         return 0.0;
     }
-    let (atoms, shape) = (word(words, m.fibres_start), word(words, m.fibres_start + 1));
+    let (atoms, shape) = (word(words, part(m, FIBRES_PART)), word(words, part(m, FIBRES_PART) + 1));
     let (entries, index_bits) = (shape & 0xff, shape >> 8 & 15);
-    let (table, light_atoms) = (m.fibres_start + 2 + atoms, word(words, m.light_atoms_start));
+    let (table, light_atoms) = (part(m, FIBRES_PART) + 2 + atoms, word(words, part(m, LIGHT_ATOMS_PART)));
     // One light at full weight: the largest that a blend can be.
     let tap = |a| Taps {
         a,
@@ -652,7 +654,7 @@ fn largest_fibre_sum(file: &Selvedge<'_>) -> f64 {
                     let index = entry & ((1 << index_bits) - 1);
                     let value = (((entry - index) << 16) as i32 >> 16) as i64;
                     let h = (value * 32_768 + 0x10000) >> 17;
-                    let l = word(words, m.light_atoms_start + 2 + light * light_atoms + index);
+                    let l = word(words, part(m, LIGHT_ATOMS_PART) + 2 + light * light_atoms + index);
                     (0..3).for_each(|c| {
                         sums[c as usize] += (h * blend_light(l, l, l, tap(light), c) as i64).abs()
                     });

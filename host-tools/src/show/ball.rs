@@ -2,7 +2,7 @@
 
 use crate::data::picture::Picture;
 use crate::error::{Result, ToolError};
-use selvedge::batch::FilteredQuery;
+use selvedge::FilteredQuery;
 use selvedge::{Direction, Rgb, Selvedge};
 
 /// A ball of the material under a distant light: orthographic, the texture laid on from the front.

@@ -168,15 +168,15 @@ fn compare_with_gpu(materials: &[Selvedge<'_>], say: &mut dyn FnMut(String)) -> 
         let size = material.image_size(0);
         let on_gpu = gpu.image(&loaded, query, size)?;
         let picture = decode_picture(material, 0, light, view)?;
-        let taps = (material.locate_light(light), material.locate_view(view));
+        let located = (material.locate_light(light), material.locate_view(view));
         let values = |i: usize| {
-            selvedge::interpolation::texel_values(
+            selvedge::kernel::interpolation::texel_values(
                 material.words(),
                 material.material(),
                 i as u32 % size[0],
                 i as u32 / size[0],
-                taps.0,
-                taps.1,
+                &located.0,
+                &located.1,
             )
         };
         let answer = |(i, rgb): (usize, &[f32; 3])| {

@@ -7,7 +7,7 @@ mod shared;
 mod sparse_ensemble;
 mod sparse_tensor;
 
-use selvedge::direction::ONE_Q18;
+use selvedge::kernel::direction::ONE_Q18;
 use selvedge::{Direction, Limits, Selvedge};
 use selvedge_tools::check::extreme::extreme;
 use selvedge_tools::format::model::MaterialModel;

@@ -1,13 +1,13 @@
 //! What every method shares: sizes, levels, directions, tables, transfer, taps, axes, values, results.
 
 use crate::Seen;
-use selvedge::direction::{ONE_Q14, ONE_Q18, hull_start};
-use selvedge::fixed::ONE_Q15;
-use selvedge::interpolation::{VALUE_BOUND, radiance};
-use selvedge::pair_table::BASE_BOUND;
-use selvedge::position::axis_at_position;
-use selvedge::words::word;
-use selvedge::{Direction, Selvedge, Taps, Values};
+use selvedge::container::pair_table::BASE_BOUND;
+use selvedge::kernel::direction::{ONE_Q14, ONE_Q18, hull_start};
+use selvedge::kernel::fixed::ONE_Q15;
+use selvedge::kernel::interpolation::{VALUE_BOUND, radiance};
+use selvedge::kernel::position::axis_at_position;
+use selvedge::kernel::words::word;
+use selvedge::{Direction, Located, Selvedge, Taps, Values};
 use selvedge_tools::format::model::{ChannelModel, MaterialModel, TransferModel};
 use selvedge_tools::math::random::Random;
 use selvedge_tools::methods::sparse_ensemble::example::example_model;
@@ -133,15 +133,15 @@ pub fn of_samples(material: &Selvedge<'_>, seen: &mut Seen, seed: u64) {
             z_q15: random.range(-2000, ONE_Q15 as i64) as i32,
         };
         let (asked, view) = (direction(), direction());
-        let taps = material.locate_light(asked);
-        of_taps(material, taps, seen);
+        let located = material.locate_light(asked);
+        of_taps(material, located.taps, seen);
         let u = random.word();
         let axis = axis_at_position(m.edge, m.edge_reciprocal_q18, m.width, u);
         seen.say(axis.count == 1, "axis: one block");
         seen.say(axis.count == 2, "axis: two blocks");
         seen.say(axis.count == 2 && axis.second.block < axis.first.block, "axis: wraps around");
-        let values = material.filtered_values(u, random.word(), taps, material.locate_view(view));
-        of_values(material, values, taps, seen);
+        let values = material.filtered_values(u, random.word(), &located, &material.locate_view(view));
+        of_values(material, values, &located, seen);
         if m.level_count > 1 {
             let at = |level_q16| material.trilinear(level_q16, u, 7, asked, view);
             seen.say(at(0) != at(0x8000), "between levels");
@@ -161,7 +161,7 @@ fn of_taps(material: &Selvedge<'_>, taps: Taps, seen: &mut Seen) {
     seen.say((1..ONE_Q15).contains(&taps.cosine_q15), "cosine: less than one");
 }
 
-fn of_values(material: &Selvedge<'_>, values: Values, light: Taps, seen: &mut Seen) {
+fn of_values(material: &Selvedge<'_>, values: Values, light: &Located, seen: &mut Seen) {
     for value in [values.c0, values.c1, values.c2] {
         seen.say(value == VALUE_BOUND, "values: clamped above");
         seen.say(value == -VALUE_BOUND, "values: clamped below");

@@ -2,11 +2,13 @@
 
 use crate::{Seen, any_direction};
 use selvedge::Selvedge;
-use selvedge::ensemble::{RECORD_BOUND, coefficients_start, dequantise, read_record, record_q20};
-use selvedge::ensemble_set::{LOW_BITS_LIMIT, SUM_LIMIT};
-use selvedge::material::CHANNEL_FULL;
-use selvedge::position::{axis_at_position, block_count};
-use selvedge::words::word;
+use selvedge::kernel::material::CHANNEL_FULL;
+use selvedge::kernel::position::{axis_at_position, block_count};
+use selvedge::kernel::words::word;
+use selvedge::method::sparse_ensemble::check::{LOW_BITS_LIMIT, SUM_LIMIT};
+use selvedge::method::sparse_ensemble::{
+    RECORD_BOUND, coefficients_start, dequantise, read_record, record_q20,
+};
 use selvedge_tools::format::model::MaterialModel;
 use selvedge_tools::math::random::Random;
 use selvedge_tools::methods::sparse_ensemble::example::example_model;
@@ -93,7 +95,7 @@ fn of_samples(material: &Selvedge<'_>, seen: &mut Seen) {
     let mut random = Random::new(m.width as u64);
     for channel in m.channels.iter().filter(|channel| channel.state == CHANNEL_FULL) {
         for layer in 0..m.layer_count {
-            let start = coefficients_start(words, &m, *channel, 0, layer);
+            let start = coefficients_start(words, &m, channel.full_rank, 0, layer);
             for block in 0..word(words, start + 1).min(200) {
                 let record = read_record(words, start, block);
                 seen.say(record.count > 0 && record.low_bits == 0, "low bits: 0");
@@ -106,7 +108,7 @@ fn of_samples(material: &Selvedge<'_>, seen: &mut Seen) {
             let light = material.locate_light(any_direction(&mut random));
             let view = material.locate_view(any_direction(&mut random));
             let block = y.first.block * block_count(&m, m.width) + x.first.block;
-            let record = read_record(words, coefficients_start(words, &m, *channel, 0, 0), block);
+            let record = read_record(words, coefficients_start(words, &m, channel.full_rank, 0, 0), block);
             if record.count > 0 {
                 let texture = record_q20(words, *channel, record, x.first, y.first, light, view);
                 seen.say(texture.abs() == RECORD_BOUND, "record: clamped");

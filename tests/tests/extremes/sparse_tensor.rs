@@ -2,12 +2,12 @@
 
 use crate::{Seen, any_direction};
 use selvedge::Selvedge;
-use selvedge::position::axis_at_position;
-use selvedge::tensor::{
+use selvedge::kernel::position::axis_at_position;
+use selvedge::method::sparse_tensor::check::{FIBRE_SUM_LIMIT, LIST_SUM_LIMIT};
+use selvedge::method::sparse_tensor::{
     ANGULAR_BOUND, GROUP_TEXELS, LAYER_BOUND, angular_q15, bit_length, layer_q20, list_coefficient,
     list_low_bits,
 };
-use selvedge::tensor_set::{FIBRE_SUM_LIMIT, LIST_SUM_LIMIT};
 use selvedge_tools::format::model::MaterialModel;
 use selvedge_tools::math::random::Random;
 use selvedge_tools::methods::sparse_tensor::layout::index_mask;

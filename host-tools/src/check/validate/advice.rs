@@ -3,9 +3,9 @@
 
 use crate::methods::advice::{Advice, Advise};
 use crate::methods::{self, METHODS};
-use selvedge::direction::point;
-use selvedge::directory::METADATA;
-use selvedge::words::{Words, high_i16, low_i16, word};
+use selvedge::container::directory::METADATA;
+use selvedge::kernel::direction::point;
+use selvedge::kernel::words::{Words, high_i16, low_i16, word};
 use selvedge::{Finding, Selvedge};
 use std::sync::LazyLock;
 

@@ -1,6 +1,6 @@
 //! `validate`: every finding of a file, as the core's own checker reports it, and what is legal but wasteful.
 //!
-//! There is no second parser: [`selvedge::open_telling`] is `open` with a sink that goes on. What this module
+//! There is no second parser: [`selvedge::open_reporting`] is `open` with a sink that goes on. What this module
 //! adds is words: severity, hints, counts, and reports as text, JSON ([`Reports`] is the published schema)
 //! and SARIF.
 
@@ -193,7 +193,7 @@ pub fn validate(name: &str, bytes: &[u8], dictionary: Option<&[u8]>, options: &O
     let (valid, opened) = if is_dictionary(bytes) {
         (selvedge::validate(bytes, dictionary, &options.limits, &mut sink), None)
     } else {
-        let opened = selvedge::open_telling(bytes, dictionary, &options.limits, &mut sink);
+        let opened = selvedge::open_reporting(bytes, dictionary, &options.limits, &mut sink);
         (opened.is_some(), opened)
     };
     if let Some(opened) = opened {

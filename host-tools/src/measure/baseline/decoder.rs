@@ -7,7 +7,7 @@
 use super::pca::{Domain, Pca};
 use crate::math::linear::product_bt;
 use crate::measure::compare::vector;
-use selvedge::position::axis_at_position;
+use selvedge::kernel::position::axis_at_position;
 use selvedge::{Direction, FilteredQuery, Selvedge, Taps};
 
 /// Directions of a set between which a value is interpolated.
@@ -135,7 +135,7 @@ impl Locator<'_> {
         if two_nearest {
             Blend::two_nearest(&self.lights, vector(direction))
         } else {
-            Blend::of(self.file.locate_light(direction))
+            Blend::of(self.file.locate_light(direction).taps)
         }
     }
 
@@ -144,7 +144,7 @@ impl Locator<'_> {
         if two_nearest {
             Blend::two_nearest(&self.views, vector(direction))
         } else {
-            Blend::of(self.file.locate_view(direction))
+            Blend::of(self.file.locate_view(direction).taps)
         }
     }
 

@@ -6,11 +6,12 @@ use crate::methods::sparse_ensemble::file::{blocks_of_level, record_coefficients
 use crate::methods::sparse_ensemble::layout::{ATOM_WORDS, atom_list, factor_entry};
 use rayon::prelude::*;
 use selvedge::Selvedge;
-use selvedge::cost::record_operations;
-use selvedge::directory::COEFFICIENTS;
-use selvedge::ensemble::{coefficients_start, read_record};
-use selvedge::material::{CHANNEL_FULL, Channel};
-use selvedge::words::word;
+use selvedge::kernel::material::{CHANNEL_FULL, channel_of};
+use selvedge::kernel::words::word;
+use selvedge::method::sparse_ensemble::check::COEFFICIENTS;
+use selvedge::method::sparse_ensemble::cost::record_operations;
+use selvedge::method::sparse_ensemble::{Tables, tables_of};
+use selvedge::method::sparse_ensemble::{coefficients_start, read_record};
 
 static UNUSED_DICTIONARIES: Advice = Advice {
     id: "W2",
@@ -56,14 +57,15 @@ struct Use {
 /// Walks the records of a legal material.
 pub fn advise(opened: &Selvedge<'_>, advise: &mut Advise<'_>) {
     let words = opened.words();
-    let is_full = |channel: &&Channel| channel.state == CHANNEL_FULL;
-    let full: Vec<Channel> = opened.material().channels.iter().filter(is_full).copied().collect();
-    let seen: Vec<_> = full.par_iter().map(|channel| uses(opened, *channel)).collect();
-    for (channel, (atoms, dictionaries)) in full.iter().zip(seen) {
+    let material = opened.material();
+    let is_full = |number: &u32| channel_of(material, *number).state == CHANNEL_FULL;
+    let full: Vec<Tables> = (0..3).filter(is_full).map(|number| tables_of(material, number)).collect();
+    let seen: Vec<_> = full.par_iter().map(|tables| uses(opened, *tables)).collect();
+    for (&tables, (atoms, dictionaries)) in full.iter().zip(seen) {
         // Atoms are always in the material's own file, so a word's number is a fourth of its byte offset.
         let all = || {
             (0u32..).zip(&atoms).flat_map(|(k, list)| {
-                let [_, first] = atom_list(words, *channel, k);
+                let [_, first] = atom_list(words, tables, k);
                 (0u32..).zip(list).map(move |(i, used)| ((first + i * ATOM_WORDS) * 4, used))
             })
         };
@@ -74,7 +76,7 @@ pub fn advise(opened: &Selvedge<'_>, advise: &mut Advise<'_>) {
         report_count(&UNREACHED_VALUES, &mut unreached.map(|(at, _)| at), advise);
         if has_own_dictionary(opened) {
             let unused = (0u32..).zip(&dictionaries).filter(|(_, used)| !**used);
-            let mut offsets = unused.map(|(k, _)| factor_entry(channel.angular_start, k) * 4);
+            let mut offsets = unused.map(|(k, _)| factor_entry(tables.angular_start, k) * 4);
             report_count(&UNUSED_DICTIONARIES, &mut offsets, advise);
         }
     }
@@ -82,16 +84,16 @@ pub fn advise(opened: &Selvedge<'_>, advise: &mut Advise<'_>) {
 }
 
 /// How atoms are used, by dictionary; and which dictionaries are.
-fn uses(opened: &Selvedge<'_>, channel: Channel) -> (Vec<Vec<Use>>, Vec<bool>) {
+fn uses(opened: &Selvedge<'_>, tables: Tables) -> (Vec<Vec<Use>>, Vec<bool>) {
     let (header, material, words) = (opened.header(), opened.material(), opened.words());
-    let count = word(words, channel.atoms_start);
+    let count = word(words, tables.atoms_start);
     let fresh = Use { count: 0, least: u32::MAX, most: 0 };
     let mut atoms: Vec<Vec<Use>> =
-        (0..count).map(|k| vec![fresh; atom_list(words, channel, k)[0] as usize]).collect();
+        (0..count).map(|k| vec![fresh; atom_list(words, tables, k)[0] as usize]).collect();
     let mut dictionaries = vec![false; count as usize];
     for level in 0..header.level_count {
         for layer in 0..header.layer_count {
-            let start = coefficients_start(words, material, channel, level, layer);
+            let start = coefficients_start(words, material, tables.full_rank, level, layer);
             for block in 0..blocks_of_level(opened, level) {
                 let record = read_record(words, start, block);
                 if record.count == 0 {

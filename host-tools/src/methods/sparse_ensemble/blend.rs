@@ -17,8 +17,8 @@ use crate::methods::sparse_ensemble::model::{
 use crate::methods::sparse_ensemble::quantise::{FloatRecord, quantise};
 use crate::methods::sparse_ensemble::trim::drop_unused;
 use rayon::prelude::*;
-use selvedge::ensemble::dequantise;
-use selvedge::ensemble_set::{DICTIONARY_LIMIT, SUM_LIMIT};
+use selvedge::method::sparse_ensemble::check::{DICTIONARY_LIMIT, SUM_LIMIT};
+use selvedge::method::sparse_ensemble::dequantise;
 use std::collections::BTreeMap;
 
 /// Most coefficients of a record, by the width of its count (10.3-3).

@@ -6,13 +6,14 @@
 
 use crate::methods::sample::{SampleAt, spans};
 use crate::methods::sparse_ensemble::layout::{RecordTables, atom_columns, atom_of_list, atom_shift};
-use selvedge::ensemble::{
+use selvedge::kernel::fixed::{HALF_Q15, clamp_magnitude, multiply_q15, round_shift};
+use selvedge::kernel::material::{CHANNEL_FULL, channel_of, level_size};
+use selvedge::kernel::position::{Span, block_count};
+use selvedge::kernel::words::{Words, bit_window, low_part};
+use selvedge::method::sparse_ensemble::{
     RECORD_BOUND, Record, blend_column, blend_span, coefficients_start, dequantise, read_record,
 };
-use selvedge::fixed::{HALF_Q15, clamp_magnitude, multiply_q15, round_shift};
-use selvedge::material::{CHANNEL_FULL, Channel, level_size};
-use selvedge::position::{Span, block_count};
-use selvedge::words::{Words, bit_window, low_part};
+use selvedge::method::sparse_ensemble::{Tables, tables_of};
 use selvedge::{Selvedge, Values};
 
 /// A coefficient: dequantised, blended twice by three, multiplied with each other and with the value.
@@ -23,24 +24,26 @@ const OF_CLOSE: u64 = 4;
 
 /// The textures of a sample, and the operations that they take.
 pub fn count(opened: &Selvedge<'_>, at: &SampleAt, operations: &mut u64) -> Values {
-    let [c0, c1, c2] = opened.material().channels.map(|channel| {
-        if channel.state == CHANNEL_FULL { texture(opened, channel, at, operations) } else { 0 }
+    let material = opened.material();
+    let [c0, c1, c2] = [0, 1, 2].map(|number| {
+        let full = channel_of(material, number).state == CHANNEL_FULL;
+        if full { texture(opened, tables_of(material, number), at, operations) } else { 0 }
     });
     Values { c0, c1, c2 }
 }
 
 /// The texture of one channel.
-fn texture(opened: &Selvedge<'_>, channel: Channel, at: &SampleAt, operations: &mut u64) -> i32 {
+fn texture(opened: &Selvedge<'_>, tables: Tables, at: &SampleAt, operations: &mut u64) -> i32 {
     let (words, m) = (opened.words(), opened.material());
     let mut texture = 0i32;
-    for y in spans(at.y) {
-        for x in spans(at.x) {
-            let block = y.block * block_count(m, level_size(m.width, at.level)) + x.block;
+    for y in spans(at.place.y) {
+        for x in spans(at.place.x) {
+            let block = y.block * block_count(m, level_size(m.width, at.place.level)) + x.block;
             for layer in 0..m.layer_limit {
-                let start = coefficients_start(words, m, channel, at.level, layer);
+                let start = coefficients_start(words, m, tables.full_rank, at.place.level, layer);
                 let record = read_record(words, start, block);
                 if record.count > 0 {
-                    let adds = walk_record(opened, channel, record, [x, y], at, operations);
+                    let adds = walk_record(opened, tables, record, [x, y], at, operations);
                     texture = texture.wrapping_add(adds);
                 }
             }
@@ -81,14 +84,14 @@ impl Positions<'_> {
 /// One record, step by step as 10.7 goes.
 fn walk_record(
     opened: &Selvedge<'_>,
-    channel: Channel,
+    tables: Tables,
     record: Record,
     [x, y]: [Span; 2],
     at: &SampleAt,
     operations: &mut u64,
 ) -> i32 {
     let words = opened.words();
-    let tables = RecordTables::of(words, channel, record.dictionary);
+    let tables = RecordTables::of(words, tables, record.dictionary);
     let (mut total, mut sum_y, mut sum_xy) = (0i32, 0i32, 0i32);
     let (mut at_x, mut at_y) = (0, 0);
     let mut closes = 0;
@@ -113,8 +116,8 @@ fn walk_record(
             sum_y = 0;
             at_y = next_y;
         }
-        let u_light = blend_column(words, tables.light.0, tables.light.1, at.light, light);
-        let u_view = blend_column(words, tables.view.0, tables.view.1, at.view, view);
+        let u_light = blend_column(words, tables.light.0, tables.light.1, at.light.taps, light);
+        let u_view = blend_column(words, tables.view.0, tables.view.1, at.view.taps, view);
         let u_angular = u_light.wrapping_mul(u_view).wrapping_add(HALF_Q15) >> 15;
         let coefficient = dequantise(quantiser, value, record.value_bits);
         sum_xy = sum_xy.wrapping_add(round_shift(coefficient.wrapping_mul(u_angular), atom_shift(atom)));

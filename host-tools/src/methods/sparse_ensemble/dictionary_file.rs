@@ -16,7 +16,7 @@ use crate::methods::sparse_ensemble::model::{DictionaryModel, EnsembleModel, Ens
 use crate::methods::sparse_ensemble::train::{Options, Trained};
 use glam::DVec3;
 use selvedge::Limits;
-use selvedge::directory::{ANGULAR, SPATIAL};
+use selvedge::method::sparse_ensemble::check::{ANGULAR, SPATIAL};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

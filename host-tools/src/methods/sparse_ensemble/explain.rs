@@ -5,11 +5,12 @@ use crate::methods::sample::{Explained, SampleAt};
 use crate::methods::sparse_ensemble::file::record_coefficients;
 use crate::methods::sparse_ensemble::layout::{RecordTables, atom_columns, atom_of_list, atom_shift};
 use selvedge::Selvedge;
-use selvedge::ensemble::{
+use selvedge::kernel::material::{CHANNEL_FULL, channel_of, level_size};
+use selvedge::kernel::position::block_count;
+use selvedge::method::sparse_ensemble::{
     Record, blend_column, blend_span, coefficients_start, dequantise, read_record, record_q20,
 };
-use selvedge::material::{CHANNEL_FULL, Channel, level_size};
-use selvedge::position::block_count;
+use selvedge::method::sparse_ensemble::{Tables, tables_of};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -60,24 +61,27 @@ pub struct EnsembleReport {
 
 /// Takes the textures of a texel apart.
 pub fn explain(opened: &Selvedge<'_>, at: &SampleAt) -> Box<dyn Explained> {
-    let channels = opened.material().channels.map(|channel| {
-        let layers = if channel.state == CHANNEL_FULL { opened.material().layer_limit } else { 0 };
-        (0..layers).filter_map(|layer| record_report(opened, channel, layer, at)).collect()
+    let material = opened.material();
+    let channels = [0, 1, 2].map(|number| {
+        let full = channel_of(material, number).state == CHANNEL_FULL;
+        let layers = if full { material.layer_limit } else { 0 };
+        let tables = tables_of(material, number);
+        (0..layers).filter_map(|layer| record_report(opened, tables, layer, at)).collect()
     });
     Box::new(EnsembleReport { channels })
 }
 
-fn record_report(opened: &Selvedge<'_>, channel: Channel, layer: u32, at: &SampleAt) -> Option<RecordReport> {
+fn record_report(opened: &Selvedge<'_>, tables: Tables, layer: u32, at: &SampleAt) -> Option<RecordReport> {
     let (material, words) = (opened.material(), opened.words());
-    let (x, y) = (at.x.first, at.y.first);
-    let block = y.block * block_count(material, level_size(material.width, at.level)) + x.block;
-    let start = coefficients_start(words, material, channel, at.level, layer);
+    let (x, y) = (at.place.x.first, at.place.y.first);
+    let block = y.block * block_count(material, level_size(material.width, at.place.level)) + x.block;
+    let start = coefficients_start(words, material, tables.full_rank, at.place.level, layer);
     let record = read_record(words, start, block);
     if record.count == 0 {
         return None;
     }
-    let mut terms = terms(opened, channel, record, at);
-    let adds = record_q20(words, channel, record, x, y, at.light, at.view) as f64 / ONE_Q20;
+    let mut terms = terms(opened, tables, record, at);
+    let adds = record_q20(words, tables, record, x, y, at.light.taps, at.view.taps) as f64 / ONE_Q20;
     let rounding = adds - terms.iter().map(|term| term.adds).sum::<f64>();
     terms.sort_by(|a, b| b.adds.abs().total_cmp(&a.adds.abs()).then(a.atom.cmp(&b.atom)));
     let Record { dictionary, shift, count, .. } = record;
@@ -85,18 +89,18 @@ fn record_report(opened: &Selvedge<'_>, channel: Channel, layer: u32, at: &Sampl
 }
 
 /// The coefficients of a record in their order.
-fn terms(opened: &Selvedge<'_>, channel: Channel, record: Record, at: &SampleAt) -> Vec<Term> {
+fn terms(opened: &Selvedge<'_>, tables: Tables, record: Record, at: &SampleAt) -> Vec<Term> {
     let words = opened.words();
-    let tables = RecordTables::of(words, channel, record.dictionary);
+    let of_record = RecordTables::of(words, tables, record.dictionary);
     let mut terms = Vec::new();
     record_coefficients(words, record, |position, value| {
-        let [atom, quantiser] = atom_of_list(words, tables.atoms, position);
+        let [atom, quantiser] = atom_of_list(words, of_record.atoms, position);
         let columns = atom_columns(atom);
         let factors_q15 = [
-            blend_column(words, tables.light.0, tables.light.1, at.light, columns[0]),
-            blend_column(words, tables.view.0, tables.view.1, at.view, columns[1]),
-            blend_span(words, tables.x.0, tables.x.1, at.x.first, columns[2]),
-            blend_span(words, tables.y.0, tables.y.1, at.y.first, columns[3]),
+            blend_column(words, of_record.light.0, of_record.light.1, at.light.taps, columns[0]),
+            blend_column(words, of_record.view.0, of_record.view.1, at.view.taps, columns[1]),
+            blend_span(words, of_record.x.0, of_record.x.1, at.place.x.first, columns[2]),
+            blend_span(words, of_record.y.0, of_record.y.1, at.place.y.first, columns[3]),
         ];
         let coefficient = dequantise(quantiser, value, record.value_bits);
         // 10.7 without its roundings: the angular product in Q15, then the atom's and the record's shift, to
@@ -149,7 +153,7 @@ mod tests {
     use crate::methods::sparse_ensemble::example::example_model;
     use crate::methods::sparse_ensemble::extreme::extreme_model;
     use selvedge::Limits;
-    use selvedge::position::axis_at_texel;
+    use selvedge::kernel::position::axis_at_texel;
 
     /// Each of the 16 x 16 spatial sums rounds once or twice before the record's shift, each term once, and
     /// its angular product by half a unit in Q15.
@@ -179,13 +183,15 @@ mod tests {
                 let light = opened.light_direction(random.word() % header.light_count);
                 let view = opened.view_direction(random.word() % header.view_count);
                 let (light, view) = (opened.locate_light(light), opened.locate_view(view));
-                let at = SampleAt { level: 0, x, y, light, view };
-                let records = material.channels.into_iter().flat_map(|channel| {
-                    let layers = if channel.state == CHANNEL_FULL { material.layer_limit } else { 0 };
-                    (0..layers).map(move |layer| (channel, layer))
+                let at =
+                    SampleAt { place: selvedge::kernel::position::Place { level: 0, x, y }, light, view };
+                let records = (0..3).flat_map(|number| {
+                    let full = channel_of(material, number).state == CHANNEL_FULL;
+                    let layers = if full { material.layer_limit } else { 0 };
+                    (0..layers).map(move |layer| (tables_of(material, number), layer))
                 });
-                for (channel, layer) in records {
-                    let Some(record) = record_report(&opened, channel, layer, &at) else { continue };
+                for (tables, layer) in records {
+                    let Some(record) = record_report(&opened, tables, layer, &at) else { continue };
                     terms += record.terms.len();
                     assert_eq!(record.terms.len(), record.count as usize);
                     assert!(

@@ -7,8 +7,8 @@ use crate::methods::reach::{Extent, Reach, extreme_frame};
 use crate::methods::sparse_ensemble::model::{
     AtomModel, CoefficientsModel, DictionaryModel, EnsembleModel, EnsembleTexture, FactorModel, RecordModel,
 };
-use selvedge::ensemble::dequantise;
-use selvedge::ensemble_set::SUM_LIMIT;
+use selvedge::method::sparse_ensemble::check::SUM_LIMIT;
+use selvedge::method::sparse_ensemble::dequantise;
 
 /// A legal material by random numbers.
 pub fn extreme_model(r: &mut Random, reach: Reach) -> MaterialModel {

@@ -10,12 +10,13 @@ use crate::methods::sparse_ensemble::model::{
     AtomModel, CoefficientsModel, DictionaryModel, EnsembleModel, EnsembleTexture, FactorModel, RecordModel,
 };
 use selvedge::Selvedge;
-use selvedge::directory::{ANGULAR, ATOMS, COEFFICIENTS, SPATIAL};
-use selvedge::ensemble::{LOW_BITS_BITS, Record, SHIFT_BITS, coefficients_start, read_record};
-use selvedge::ensemble_set::LOW_BITS_LIMIT;
-use selvedge::material::{CHANNEL_FULL, Channel, level_size};
-use selvedge::stream::{Ones, window};
-use selvedge::words::{Words, low_part, word};
+use selvedge::kernel::material::{CHANNEL_FULL, channel_of, level_size};
+use selvedge::kernel::words::{Words, low_part, word};
+use selvedge::method::sparse_ensemble::check::LOW_BITS_LIMIT;
+use selvedge::method::sparse_ensemble::check::{ANGULAR, ATOMS, COEFFICIENTS, SPATIAL};
+use selvedge::method::sparse_ensemble::{LOW_BITS_BITS, Record, SHIFT_BITS, coefficients_start, read_record};
+use selvedge::method::sparse_ensemble::{Tables, tables_of};
+use selvedge::walk::stream::{Ones, window};
 
 /// Angular and spatial factors of every channel (10.1, 10.2).
 pub fn dictionary_sections(texture: &EnsembleTexture) -> Vec<RawSection> {
@@ -115,25 +116,29 @@ fn coefficient_words(coefficients: &CoefficientsModel, dictionaries: u32) -> Vec
 
 /// The textures of an open material.
 pub fn read(opened: &Selvedge<'_>) -> EnsembleTexture {
-    let channel = |channel: Channel| (channel.state == CHANNEL_FULL).then(|| read_ensemble(opened, channel));
-    EnsembleTexture { channels: opened.material().channels.map(channel) }
+    let material = opened.material();
+    let channel = |number: u32| {
+        let full = channel_of(material, number).state == CHANNEL_FULL;
+        full.then(|| read_ensemble(opened, tables_of(material, number)))
+    };
+    EnsembleTexture { channels: [0, 1, 2].map(channel) }
 }
 
-fn read_ensemble(opened: &Selvedge<'_>, channel: Channel) -> EnsembleModel {
+fn read_ensemble(opened: &Selvedge<'_>, tables: Tables) -> EnsembleModel {
     let (header, material, words) = (opened.header(), opened.material(), opened.words());
     let factor = |section: u32, k: u32, second: u32, rows: u32| {
         let [columns, table] = factor_table(words, section, k, second);
         FactorModel { columns, entries: packed_rows(words, table, rows, columns) }
     };
-    let count = word(words, channel.atoms_start);
+    let count = word(words, tables.atoms_start);
     let dictionary = |k: u32| DictionaryModel {
-        light: factor(channel.angular_start, k, 0, header.light_count),
-        view: factor(channel.angular_start, k, 1, header.view_count),
-        x: factor(channel.spatial_start, k, 0, header.edge),
-        y: factor(channel.spatial_start, k, 1, header.edge),
+        light: factor(tables.angular_start, k, 0, header.light_count),
+        view: factor(tables.angular_start, k, 1, header.view_count),
+        x: factor(tables.spatial_start, k, 0, header.edge),
+        y: factor(tables.spatial_start, k, 1, header.edge),
     };
     let atoms = |k: u32| {
-        let [length, list] = atom_list(words, channel, k);
+        let [length, list] = atom_list(words, tables, k);
         let atom = |i: u32| {
             let [word, quantiser] = atom_of_list(words, list, i);
             AtomModel::of_words(word, quantiser)
@@ -143,7 +148,7 @@ fn read_ensemble(opened: &Selvedge<'_>, channel: Channel) -> EnsembleModel {
     let of_level = |level: u32| {
         let blocks = blocks_of_level(opened, level);
         let of_layer = |layer: u32| {
-            let start = coefficients_start(words, material, channel, level, layer);
+            let start = coefficients_start(words, material, tables.full_rank, level, layer);
             let record = |block: u32| read_record_model(words, read_record(words, start, block));
             let records = (0..blocks).map(record).collect();
             CoefficientsModel { value_bits: value_bits(word(words, start)), records }

@@ -1,7 +1,7 @@
 //! Words of the sections of chapter 10, field by field, and where a file has them.
 
-use selvedge::material::Channel;
-use selvedge::words::{Words, word};
+use selvedge::kernel::words::{Words, word};
+use selvedge::method::sparse_ensemble::Tables;
 
 /// Lowest bit of an atom's column of the y factor (10.5-2).
 pub const Y_BIT: u32 = 28;
@@ -50,7 +50,7 @@ pub fn value_bits(head: u32) -> u32 {
     head & EIGHT_BITS
 }
 
-/// First word of the header of a dictionary in the factors of a channel.
+/// First word of the header of a dictionary in the factors of a tables.
 pub fn factor_entry(section: u32, dictionary: u32) -> u32 {
     section + COUNT_WORDS + dictionary * FACTOR_ENTRY_WORDS
 }
@@ -62,9 +62,9 @@ pub fn factor_table(words: Words<'_>, section: u32, dictionary: u32, second: u32
 }
 
 /// Number of atoms of a dictionary, and the first word of their list (10.5-4).
-pub fn atom_list(words: Words<'_>, channel: Channel, dictionary: u32) -> [u32; 2] {
-    let entry = channel.atoms_start + COUNT_WORDS + dictionary * LIST_ENTRY_WORDS;
-    [word(words, entry), channel.atoms_start + word(words, entry + 1)]
+pub fn atom_list(words: Words<'_>, tables: Tables, dictionary: u32) -> [u32; 2] {
+    let entry = tables.atoms_start + COUNT_WORDS + dictionary * LIST_ENTRY_WORDS;
+    [word(words, entry), tables.atoms_start + word(words, entry + 1)]
 }
 
 /// Word and quantiser of an atom of a list.
@@ -90,17 +90,17 @@ pub struct RecordTables {
 
 impl RecordTables {
     /// Of a dictionary by its number.
-    pub fn of(words: Words<'_>, channel: Channel, dictionary: u32) -> RecordTables {
+    pub fn of(words: Words<'_>, tables: Tables, dictionary: u32) -> RecordTables {
         let table = |section: u32, second: u32| {
             let [columns, table] = factor_table(words, section, dictionary, second);
             (table, columns.div_ceil(2))
         };
         RecordTables {
-            light: table(channel.angular_start, 0),
-            view: table(channel.angular_start, 1),
-            x: table(channel.spatial_start, 0),
-            y: table(channel.spatial_start, 1),
-            atoms: atom_list(words, channel, dictionary)[1],
+            light: table(tables.angular_start, 0),
+            view: table(tables.angular_start, 1),
+            x: table(tables.spatial_start, 0),
+            y: table(tables.spatial_start, 1),
+            atoms: atom_list(words, tables, dictionary)[1],
         }
     }
 }

@@ -24,8 +24,8 @@ use crate::format::container::level_of_instance;
 use crate::methods::method::{Method, SectionName};
 use model::EnsembleTexture;
 use selvedge::Rule;
-use selvedge::directory::{ANGULAR, ATOMS, COEFFICIENTS, SPATIAL};
-use selvedge::header::METHOD_SPARSE_ENSEMBLE;
+use selvedge::method::sparse_ensemble::METHOD_SPARSE_ENSEMBLE;
+use selvedge::method::sparse_ensemble::check::{ANGULAR, ATOMS, COEFFICIENTS, SPATIAL};
 
 /// What the tools have of the sparse ensemble.
 pub static METHOD: Method = Method {

@@ -10,8 +10,8 @@ use crate::error::{Result, ToolError};
 use crate::format::units::LARGEST_ENTRY;
 use crate::methods::sparse_ensemble::layout::{VIEW_BIT, atom_columns};
 use crate::methods::sparse_ensemble::model::{AtomModel, CoefficientsModel, RecordModel};
-use selvedge::ensemble::dequantise;
-use selvedge::ensemble_set::{ATOM_LIMIT, SUM_LIMIT};
+use selvedge::method::sparse_ensemble::check::{ATOM_LIMIT, SUM_LIMIT};
+use selvedge::method::sparse_ensemble::dequantise;
 
 /// A record before quantisation: its dictionary, and atoms (columns only) with coefficients.
 ///

@@ -5,8 +5,8 @@ use crate::format::container::RawSection;
 use crate::format::texture::{Blend, Blended, Kept, Texture};
 use crate::methods::sparse_ensemble::model::{EnsembleTexture, NAME};
 use crate::methods::sparse_ensemble::{blend, file, trim};
-use selvedge::cost::record_operations;
-use selvedge::header::METHOD_SPARSE_ENSEMBLE;
+use selvedge::method::sparse_ensemble::METHOD_SPARSE_ENSEMBLE;
+use selvedge::method::sparse_ensemble::cost::record_operations;
 use serde_json::Value;
 
 /// Most blocks that a filtered sample meets (6.2).

@@ -4,7 +4,7 @@ use crate::methods::advice::{Advice, Advise, UNUSED_ATOMS, has_own_dictionary, r
 use crate::methods::sparse_tensor::file::{list, texels_of_level};
 use crate::methods::sparse_tensor::layout::{atom_count, shifts_at};
 use selvedge::Selvedge;
-use selvedge::tensor::lists_start;
+use selvedge::method::sparse_tensor::lists_start;
 
 /// All of them.
 pub const ADVICE: &[&Advice] = &[&UNUSED_ATOMS];

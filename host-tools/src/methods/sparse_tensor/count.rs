@@ -9,11 +9,13 @@ use crate::methods::sparse_tensor::layout::{
     CHANNEL_BITS, FIBRE_SHIFT, LIGHT_SHIFT, atom_count, atom_shifts, entries_start, fibre_shape, light_row,
     value_bits_and_shift,
 };
-use selvedge::fixed::{ONE_Q15, clamp_magnitude, multiply_q15, round_shift};
-use selvedge::material::level_size;
-use selvedge::position::Axis;
-use selvedge::tensor::{ANGULAR_BOUND, LAYER_BOUND, LIST_END, lists_start, next_coefficient, open_list};
-use selvedge::words::{packed_i16, word};
+use selvedge::kernel::fixed::{ONE_Q15, clamp_magnitude, multiply_q15, round_shift};
+use selvedge::kernel::material::level_size;
+use selvedge::kernel::position::Axis;
+use selvedge::kernel::words::{packed_i16, word};
+use selvedge::method::sparse_tensor::{
+    ANGULAR_BOUND, LAYER_BOUND, LIST_END, lists_start, next_coefficient, open_list,
+};
 use selvedge::{Selvedge, Taps, Values};
 use std::collections::BTreeMap;
 
@@ -51,11 +53,11 @@ fn taps(taps: Taps) -> [(u32, i32); 3] {
 /// One layer.
 fn walk_layer(opened: &Selvedge<'_>, layer: u32, at: &SampleAt, operations: &mut u64) -> [i32; 3] {
     let (words, m) = (opened.words(), opened.material());
-    let start = lists_start(words, m, at.level, layer);
+    let start = lists_start(words, m, at.place.level, layer);
     let mut weights = BTreeMap::<u32, i32>::new();
-    for (row, weight_y) in ends(at.y) {
-        for (column, weight_x) in ends(at.x) {
-            let texel = row * level_size(m.width, at.level) + column;
+    for (row, weight_y) in ends(at.place.y) {
+        for (column, weight_x) in ends(at.place.x) {
+            let texel = row * level_size(m.width, at.place.level) + column;
             let mut list = open_list(words, start, atom_count(words, m), texel);
             while list.index != LIST_END {
                 *operations += OF_COEFFICIENT;
@@ -90,7 +92,7 @@ fn walk_atom(opened: &Selvedge<'_>, atom: u32, at: &SampleAt, operations: &mut u
         (entry << (unused - c as u32 * CHANNEL_BITS)) as i32 >> unused
     };
     let mut sums = [0i32; 3];
-    for (view, weight) in taps(at.view) {
+    for (view, weight) in taps(at.view.taps) {
         let fibre = (view * atom_count(words, m) + atom) * entries;
         for n in 0..entries {
             let entry = packed_i16(words, first, fibre + n) as u32 & 0xffff;
@@ -98,7 +100,7 @@ fn walk_atom(opened: &Selvedge<'_>, atom: u32, at: &SampleAt, operations: &mut u
             *operations += OF_ENTRY;
             let h = rounded(value * weight, FIBRE_SHIFT);
             for (c, sum) in sums.iter_mut().enumerate() {
-                let lights = taps(at.light).map(|(light, weight)| light_entry(light, index, c) * weight);
+                let lights = taps(at.light.taps).map(|(light, weight)| light_entry(light, index, c) * weight);
                 *sum += h * rounded(lights.iter().sum(), LIGHT_SHIFT);
             }
         }

@@ -4,9 +4,9 @@ use crate::format::units::ONE_Q20;
 use crate::methods::sample::{Explained, SampleAt};
 use crate::methods::sparse_tensor::file::list;
 use crate::methods::sparse_tensor::layout::{atom_count, atom_shifts, value_bits_and_shift};
-use selvedge::material::level_size;
-use selvedge::tensor::{angular_q15, layer_q20, list_coefficient, lists_start};
-use selvedge::words::word;
+use selvedge::kernel::material::level_size;
+use selvedge::kernel::words::word;
+use selvedge::method::sparse_tensor::{angular_q15, layer_q20, list_coefficient, lists_start};
 use selvedge::{Selvedge, Values};
 use serde::Serialize;
 use serde_json::Value;
@@ -60,12 +60,13 @@ fn array(values: Values) -> [i32; 3] {
 
 fn list_report(opened: &Selvedge<'_>, layer: u32, at: &SampleAt) -> ListReport {
     let (material, words) = (opened.material(), opened.words());
-    let start = lists_start(words, material, at.level, layer);
+    let start = lists_start(words, material, at.place.level, layer);
     let [value_bits, shift] = value_bits_and_shift(word(words, start));
-    let texel = at.y.first.block * level_size(material.width, at.level) + at.x.first.block;
+    let texel = at.place.y.first.block * level_size(material.width, at.place.level) + at.place.x.first.block;
     let term = |(atom, value): (u32, u16)| {
         let [angular_shift, gain_shift] = atom_shifts(words, material, atom);
-        let angular_q15 = array(angular_q15(words, material, atom, angular_shift, at.light, at.view));
+        let angular_q15 =
+            array(angular_q15(words, material, atom, angular_shift, at.light.taps, at.view.taps));
         let coefficient = list_coefficient(value as u32, value_bits);
         // 12.5 without its roundings: Q15 times Q15, then both shifts, to Q20.
         let unit = 2f64.powi(-((gain_shift + shift) as i32)) / ONE_Q20;
@@ -74,7 +75,7 @@ fn list_report(opened: &Selvedge<'_>, layer: u32, at: &SampleAt) -> ListReport {
     };
     let list = list(words, start, atom_count(words, material), texel);
     let mut terms: Vec<AbrdfTerm> = list.into_iter().map(term).collect();
-    let decoded = layer_q20(words, material, at.level, layer, at.x, at.y, at.light, at.view);
+    let decoded = layer_q20(words, material, layer, &at.place, at.light.taps, at.view.taps);
     let adds = array(decoded).map(|q20| q20 as f64 / ONE_Q20);
     let rounding = std::array::from_fn(|c| adds[c] - terms.iter().map(|term| term.adds[c]).sum::<f64>());
     let size = |term: &AbrdfTerm| term.adds.iter().map(|a| a.abs()).sum::<f64>();

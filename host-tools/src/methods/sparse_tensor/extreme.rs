@@ -6,9 +6,9 @@ use crate::methods::reach::Reach;
 use crate::methods::sparse_ensemble;
 use crate::methods::sparse_tensor::layout::index_mask;
 use crate::methods::sparse_tensor::model::{AtomShifts, ListsModel, TensorModel};
-use selvedge::material::level_size;
-use selvedge::tensor::list_coefficient;
-use selvedge::tensor_set::{FIBRE_SUM_LIMIT, LIST_SUM_LIMIT};
+use selvedge::kernel::material::level_size;
+use selvedge::method::sparse_tensor::check::{FIBRE_SUM_LIMIT, LIST_SUM_LIMIT};
+use selvedge::method::sparse_tensor::list_coefficient;
 use std::collections::BTreeSet;
 
 /// Ends of a fibre's entry.

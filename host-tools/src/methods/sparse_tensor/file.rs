@@ -8,12 +8,12 @@ use crate::methods::sparse_tensor::layout::{
 };
 use crate::methods::sparse_tensor::model::{AtomShifts, ListsModel, TensorModel};
 use selvedge::Selvedge;
-use selvedge::directory::{FIBRES, LIGHT_ATOMS, LISTS};
-use selvedge::material::{CHANNEL_FULL, level_size};
-use selvedge::tensor::{
+use selvedge::kernel::material::{CHANNEL_FULL, level_size};
+use selvedge::kernel::words::{Words, packed_i16, word};
+use selvedge::method::sparse_tensor::check::{FIBRES, LIGHT_ATOMS, LISTS};
+use selvedge::method::sparse_tensor::{
     GROUP_TEXELS, LIST_END, bit_length, light_entry, list_low_bits, lists_start, next_coefficient, open_list,
 };
-use selvedge::words::{Words, packed_i16, word};
 
 /// Light atoms and fibres (12.1, 12.2), if any channel has texture.
 pub fn dictionary_sections(tensor: &TensorModel) -> Vec<RawSection> {

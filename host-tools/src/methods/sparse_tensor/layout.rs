@@ -1,8 +1,9 @@
 //! Words of the sections of chapter 12, field by field, and where a file has them.
 
 use selvedge::Material;
-use selvedge::tensor::bit_length;
-use selvedge::words::{Words, word};
+use selvedge::kernel::material::part;
+use selvedge::kernel::words::{Words, word};
+use selvedge::method::sparse_tensor::{FIBRES_PART, LIGHT_ATOMS_PART, bit_length};
 
 /// Words in front of light atoms and of fibres (12.1-1, 12.2-1).
 pub const COUNT_WORDS: u32 = 2;
@@ -33,28 +34,28 @@ pub fn index_mask(light_atoms: u32) -> u16 {
 
 /// Light atoms of a file.
 pub fn light_atom_count(words: Words<'_>, material: &Material) -> u32 {
-    word(words, material.light_atoms_start)
+    word(words, part(material, LIGHT_ATOMS_PART))
 }
 
 /// First word of the row of a light direction in the light atoms.
 pub fn light_row(words: Words<'_>, material: &Material, light: u32) -> u32 {
-    material.light_atoms_start + COUNT_WORDS + light * light_atom_count(words, material)
+    part(material, LIGHT_ATOMS_PART) + COUNT_WORDS + light * light_atom_count(words, material)
 }
 
 /// ABRDF atoms of a file.
 pub fn atom_count(words: Words<'_>, material: &Material) -> u32 {
-    word(words, material.fibres_start)
+    word(words, part(material, FIBRES_PART))
 }
 
 /// Entries of a fibre, and the bits that number a light atom in one.
 pub fn fibre_shape(words: Words<'_>, material: &Material) -> [u32; 2] {
-    let shape = word(words, material.fibres_start + 1);
+    let shape = word(words, part(material, FIBRES_PART) + 1);
     [shape & EIGHT_BITS, shape >> SECOND_BYTE & EIGHT_BITS]
 }
 
 /// Word of the shifts of an ABRDF atom.
 pub fn shifts_at(material: &Material, atom: u32) -> u32 {
-    material.fibres_start + COUNT_WORDS + atom
+    part(material, FIBRES_PART) + COUNT_WORDS + atom
 }
 
 /// Angular shift and gain shift of an ABRDF atom (12.2-3).

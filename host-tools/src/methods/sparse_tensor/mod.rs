@@ -16,8 +16,8 @@ use crate::format::container::level_of_instance;
 use crate::methods::method::{Method, SectionName};
 use model::TensorModel;
 use selvedge::Rule;
-use selvedge::directory::{FIBRES, LIGHT_ATOMS, LISTS};
-use selvedge::header::METHOD_SPARSE_TENSOR;
+use selvedge::method::sparse_tensor::METHOD_SPARSE_TENSOR;
+use selvedge::method::sparse_tensor::check::{FIBRES, LIGHT_ATOMS, LISTS};
 
 /// What the tools have of the sparse tensor.
 pub static METHOD: Method = Method {

@@ -4,8 +4,8 @@ use crate::format::container::RawSection;
 use crate::format::texture::{Kept, Texture};
 use crate::methods::sparse_tensor::model::{NAME, TensorModel};
 use crate::methods::sparse_tensor::{file, trim};
-use selvedge::cost::layer_operations;
-use selvedge::header::METHOD_SPARSE_TENSOR;
+use selvedge::method::sparse_tensor::METHOD_SPARSE_TENSOR;
+use selvedge::method::sparse_tensor::cost::layer_operations;
 use serde_json::Value;
 
 impl Texture for TensorModel {

@@ -17,7 +17,7 @@ use crate::methods::sparse_ensemble::model::{
     CoefficientsModel, DictionaryModel, EnsembleModel, EnsembleTexture, RecordModel,
 };
 use crate::methods::sparse_ensemble::quantise::{Quantised, quantise};
-use selvedge::cost::{Shape, filtered_operations};
+use selvedge::walk::cost::{Shape, filtered_operations};
 
 /// Most quality layers (3.1).
 const LAYER_LIMIT: usize = 8;

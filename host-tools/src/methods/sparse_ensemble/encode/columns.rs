@@ -1,7 +1,7 @@
 //! Columns of bases that a file uses, as integers.
 
-use crate::methods::sparse_ensemble::model::FactorModel;
 use crate::math::linear::Basis;
+use crate::methods::sparse_ensemble::model::FactorModel;
 
 /// Columns of a basis that are used, each scaled to its largest entry.
 pub(crate) struct Used {

@@ -2,10 +2,10 @@
 
 use crate::data::dataset::Dataset;
 use crate::data::transfer::Forward;
-use crate::methods::means::mean_tables;
 use crate::error::Result;
 use crate::format::model::{PairTableModel, TransferModel};
 use crate::math::linear::{Basis, eigenbasis};
+use crate::methods::means::mean_tables;
 use crate::methods::sparse_ensemble::blocks::{Blocks, Moments, moments};
 use crate::methods::sparse_ensemble::dictionary::{Ensemble, Turn};
 use std::f64::consts::LN_2;

@@ -3,10 +3,10 @@
 use super::candidates::Candidates;
 use super::columns::{Tables, Used};
 use super::select::Selection;
-use crate::methods::sparse_ensemble::model::{AtomModel, CoefficientsModel};
 use crate::methods::sparse_ensemble::dictionary::Ensemble;
+use crate::methods::sparse_ensemble::model::{AtomModel, CoefficientsModel};
 use crate::methods::sparse_ensemble::quantise::FloatRecord;
-use selvedge::ensemble::dequantise;
+use selvedge::method::sparse_ensemble::dequantise;
 
 /// Entries are Q15 and the largest is 32,767, four times.
 const TABLE_GAIN: f64 =

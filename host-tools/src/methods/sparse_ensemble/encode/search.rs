@@ -8,9 +8,9 @@ use super::select::{Channel, Selection};
 use crate::error::{Result, ToolError};
 use crate::format::write::{write_material, write_with_dictionary};
 use crate::methods::sparse_ensemble::dictionary::Ensemble;
-use selvedge::directory::SPATIAL;
 use rayon::prelude::*;
-use selvedge::cost::record_operations;
+use selvedge::method::sparse_ensemble::check::SPATIAL;
+use selvedge::method::sparse_ensemble::cost::record_operations;
 
 /// Halvings of the part of the largest record that a cap of operations allows.
 const CAP_HALVINGS: usize = 20;

@@ -8,7 +8,7 @@
 
 use super::candidates::Candidates;
 use crate::methods::sparse_ensemble::dictionary::Ensemble;
-use selvedge::ensemble_set::ATOM_LIMIT;
+use selvedge::method::sparse_ensemble::check::ATOM_LIMIT;
 
 /// Bits of an atom's two words (10.2).
 const ATOM_BITS: f64 = 64.0;

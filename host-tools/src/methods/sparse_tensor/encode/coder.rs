@@ -8,14 +8,14 @@ use super::ranges::{Ranged, Ranges};
 use crate::data::dataset::Dataset;
 use crate::data::transfer::Forward;
 use crate::encode::goal::Target;
-use crate::methods::means::{described, mean_tables};
 use crate::error::{Result, ToolError};
 use crate::format::model::{MaterialModel, PairTableModel, TransferModel};
 use crate::format::texture::Texture;
-use crate::methods::sparse_tensor::model::{ListsModel, TensorModel};
 use crate::format::write::write_material;
 use crate::math::ksvd::{Pursuit, Rows};
 use crate::measure::baseline::pca::{Domain, Pca};
+use crate::methods::means::{described, mean_tables};
+use crate::methods::sparse_tensor::model::{ListsModel, TensorModel};
 use std::f64::consts::LN_2;
 
 /// Widths of a value that are tried.

@@ -6,8 +6,8 @@
 
 use crate::math::ksvd::Rows;
 use crate::methods::sparse_tensor::model::AtomShifts;
-use selvedge::tensor::{bit_length, list_coefficient};
-use selvedge::tensor_set::{FIBRE_SUM_LIMIT, LIST_SUM_LIMIT};
+use selvedge::method::sparse_tensor::check::{FIBRE_SUM_LIMIT, LIST_SUM_LIMIT};
+use selvedge::method::sparse_tensor::{bit_length, list_coefficient};
 
 /// Largest entry of a light atom.
 const ENTRY: f64 = 511.0;
