@@ -24,6 +24,8 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Chapter {
+    /// The base of recipes that name none.
+    base: Option<String>,
     #[serde(default)]
     valid: Vec<Recipe>,
     #[serde(default)]
@@ -39,8 +41,7 @@ struct Recipe {
     /// What it is for.
     note: String,
     /// `METHOD example`, `METHOD extreme SEED`, or the name of another recipe whose model is taken.
-    #[serde(default = "example")]
-    base: String,
+    base: Option<String>,
     /// Which file of the model: `whole`, or `material` or `dictionary` where it is split in two.
     #[serde(default)]
     part: FilePart,
@@ -59,11 +60,6 @@ struct Recipe {
     limits: Option<[u32; 3]>,
     /// What an invalid file breaks.
     expect: Option<Expect>,
-}
-
-/// The base of most recipes.
-fn example() -> String {
-    "sparse-ensemble example".into()
 }
 
 #[derive(Clone, Copy, Debug, Default, Deserialize)]
@@ -161,9 +157,14 @@ fn base_of(base: &str, models: &BTreeMap<String, MaterialModel>) -> Result<Mater
 }
 
 /// The model of a recipe: its base, changed.
-fn model_of(recipe: &Recipe, models: &BTreeMap<String, MaterialModel>) -> Result<MaterialModel> {
+fn model_of(
+    recipe: &Recipe,
+    usual: Option<&str>,
+    models: &BTreeMap<String, MaterialModel>,
+) -> Result<MaterialModel> {
     let wrong = |why: String| ToolError::Usage(format!("{}: {why}", recipe.name));
-    let base = base_of(&recipe.base, models).map_err(|error| wrong(error.to_string()))?;
+    let base = recipe.base.as_deref().or(usual).ok_or_else(|| wrong("it names no base".into()))?;
+    let base = base_of(base, models).map_err(|error| wrong(error.to_string()))?;
     if recipe.change.is_empty() {
         return Ok(base);
     }
@@ -224,7 +225,7 @@ pub fn make(folder: &Path) -> Result<Vec<Vector>> {
         for (kind, recipe) in
             chapter.valid.into_iter().map(of("valid")).chain(chapter.invalid.into_iter().map(of("invalid")))
         {
-            let model = model_of(&recipe, &models)?;
+            let model = model_of(&recipe, chapter.base.as_deref(), &models)?;
             let vector = make_one(kind, &recipe, &model, &made)
                 .map_err(|error| ToolError::Usage(format!("{}: {error}", recipe.name)))?;
             if kind == "valid" {
