@@ -7,8 +7,9 @@
 //! pairs of directions evaluates equation 2 by itself, from the same file's numbers in binary32, with colours
 //! side by side. Their directions are located beforehand, which is in their favour.
 
-use selvedge::kernel::position::axis_at_position;
-use selvedge::{Direction, FilteredQuery, Limits, Rgb, Taps};
+use selvedge::kernel::position::{Place, axis_at_position};
+use selvedge::method::sparse_tensor::sparse_tensor_textures_q20;
+use selvedge::{Direction, FilteredQuery, Limits, Located, Rgb, Taps};
 use selvedge_tools::data::dataset::{Dataset, Sample};
 use selvedge_tools::encode::goal::Target;
 use selvedge_tools::format::model::MaterialModel;
@@ -163,7 +164,7 @@ fn measure(data: &Dataset, light_atoms: usize, abrdf_atoms: usize) {
             view: direction(&mut random),
         })
         .collect();
-    let located: Vec<(Taps, Taps)> =
+    let located: Vec<(Located, Located)> =
         queries.iter().map(|q| (material.locate_light(q.light), material.locate_view(q.view))).collect();
 
     // Both give the same but for rounding, and the batch the words of the plain path.
@@ -179,16 +180,9 @@ fn measure(data: &Dataset, light_atoms: usize, abrdf_atoms: usize) {
         );
         let (words, m) = (material.words(), material.material());
         let axis = |position: u32| axis_at_position(m.edge, m.edge_reciprocal_q18, m.width, position);
-        let wanted = floats.filtered(query, light, view);
-        let got = selvedge::method::sparse_tensor::textures_q20(
-            words,
-            m,
-            0,
-            axis(query.u_q32),
-            axis(query.v_q32),
-            light,
-            view,
-        );
+        let wanted = floats.filtered(query, light.taps, view.taps);
+        let place = Place { level: 0, x: axis(query.u_q32), y: axis(query.v_q32) };
+        let got = sparse_tensor_textures_q20(words, m, &place, &light, &view);
         for (got, wanted) in [got.c0, got.c1, got.c2].into_iter().zip(wanted) {
             worst = worst.max((got as f64 / 1_048_576.0 - wanted as f64).abs());
             largest = largest.max(wanted.abs() as f64);
@@ -227,7 +221,7 @@ fn measure(data: &Dataset, light_atoms: usize, abrdf_atoms: usize) {
             queries
                 .iter()
                 .zip(&located)
-                .for_each(|(q, &(light, view))| _ = black_box(floats.filtered(q, light, view)))
+                .for_each(|(q, &(light, view))| _ = black_box(floats.filtered(q, light.taps, view.taps)))
         });
     }
     let [batch, plain, taps] = &mut rates;

@@ -146,8 +146,12 @@ fn values_are_continuous_in_the_directions() {
                 }
                 let moving = Direction::from_unit_vector(moving.map(|c| c as f32));
                 let (light, view) = if arc % 2 == 0 { (moving, still) } else { (still, moving) };
-                let now =
-                    material.filtered_values(u, v, material.locate_light(light), material.locate_view(view));
+                let now = material.filtered_values(
+                    u,
+                    v,
+                    &material.locate_light(light),
+                    &material.locate_view(view),
+                );
                 if let Some(before) = before {
                     for (largest, (a, b)) in largest.iter_mut().zip([
                         (now.c0, before.c0),

@@ -2,12 +2,12 @@
 
 use crate::{Seen, any_direction};
 use selvedge::Selvedge;
-use selvedge::kernel::material::CHANNEL_FULL;
+use selvedge::kernel::material::{CHANNEL_FULL, channel_of};
 use selvedge::kernel::position::{axis_at_position, block_count};
 use selvedge::kernel::words::word;
 use selvedge::method::sparse_ensemble::check::{LOW_BITS_LIMIT, SUM_LIMIT};
 use selvedge::method::sparse_ensemble::{
-    RECORD_BOUND, coefficients_start, dequantise, read_record, record_q20,
+    RECORD_BOUND, coefficients_start, dequantise, read_record, record_q20, tables_of,
 };
 use selvedge_tools::format::model::MaterialModel;
 use selvedge_tools::math::random::Random;
@@ -93,9 +93,10 @@ fn of_record(ensemble: &EnsembleModel, record: &RecordModel, value_bits: u32, se
 fn of_samples(material: &Selvedge<'_>, seen: &mut Seen) {
     let (m, words) = (*material.material(), material.words());
     let mut random = Random::new(m.width as u64);
-    for channel in m.channels.iter().filter(|channel| channel.state == CHANNEL_FULL) {
+    for number in (0..3).filter(|&number| channel_of(&m, number).state == CHANNEL_FULL) {
+        let tables = tables_of(&m, number);
         for layer in 0..m.layer_count {
-            let start = coefficients_start(words, &m, channel.full_rank, 0, layer);
+            let start = coefficients_start(words, &m, tables.full_rank, 0, layer);
             for block in 0..word(words, start + 1).min(200) {
                 let record = read_record(words, start, block);
                 seen.say(record.count > 0 && record.low_bits == 0, "low bits: 0");
@@ -105,12 +106,12 @@ fn of_samples(material: &Selvedge<'_>, seen: &mut Seen) {
         for _ in 0..60 {
             let mut axis = |size: u32| axis_at_position(m.edge, m.edge_reciprocal_q18, size, random.word());
             let (x, y) = (axis(m.width), axis(m.height));
-            let light = material.locate_light(any_direction(&mut random));
-            let view = material.locate_view(any_direction(&mut random));
+            let light = material.locate_light(any_direction(&mut random)).taps;
+            let view = material.locate_view(any_direction(&mut random)).taps;
             let block = y.first.block * block_count(&m, m.width) + x.first.block;
-            let record = read_record(words, coefficients_start(words, &m, channel.full_rank, 0, 0), block);
+            let record = read_record(words, coefficients_start(words, &m, tables.full_rank, 0, 0), block);
             if record.count > 0 {
-                let texture = record_q20(words, *channel, record, x.first, y.first, light, view);
+                let texture = record_q20(words, tables, record, x.first, y.first, light, view);
                 seen.say(texture.abs() == RECORD_BOUND, "record: clamped");
             }
         }

@@ -2,7 +2,7 @@
 
 use crate::{Seen, any_direction};
 use selvedge::Selvedge;
-use selvedge::kernel::position::axis_at_position;
+use selvedge::kernel::position::{Place, axis_at_position};
 use selvedge::method::sparse_tensor::check::{FIBRE_SUM_LIMIT, LIST_SUM_LIMIT};
 use selvedge::method::sparse_tensor::{
     ANGULAR_BOUND, GROUP_TEXELS, LAYER_BOUND, angular_q15, bit_length, layer_q20, list_coefficient,
@@ -113,14 +113,14 @@ fn of_samples(tensor: &TensorModel, material: &Selvedge<'_>, seen: &mut Seen) {
     let (words, m) = (material.words(), material.material());
     let mut random = Random::new(tensor.fibres.len() as u64);
     for _ in 0..10 {
-        let light = material.locate_light(any_direction(&mut random));
-        let view = material.locate_view(any_direction(&mut random));
+        let light = material.locate_light(any_direction(&mut random)).taps;
+        let view = material.locate_view(any_direction(&mut random)).taps;
         let angular = angular_q15(words, m, 0, tensor.atoms[0].angular, light, view);
         let bound = |values: [i32; 3], bound: i32| values.iter().any(|value| value.abs() == bound);
         seen.say(bound([angular.c0, angular.c1, angular.c2], ANGULAR_BOUND), "ABRDF atom: clamped");
         let mut axis = |size: u32| axis_at_position(m.edge, m.edge_reciprocal_q18, size, random.word());
         let (x, y) = (axis(m.width), axis(m.height));
-        let texture = layer_q20(words, m, 0, 0, x, y, light, view);
+        let texture = layer_q20(words, m, 0, &Place { level: 0, x, y }, light, view);
         seen.say(bound([texture.c0, texture.c1, texture.c2], LAYER_BOUND), "layer: clamped");
     }
 }

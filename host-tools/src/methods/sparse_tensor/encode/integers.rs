@@ -110,8 +110,10 @@ impl Atoms {
             slots.sort_by_key(|&(value, index)| (value == 0, index));
             slots.iter_mut().filter(|slot| slot.0 == 0).for_each(|slot| slot.1 = 0);
             for lights in self.lights.chunks(self.light_atoms) {
-                for c in 0..3 {
-                    let sum: i64 = slots.iter().map(|&(v, i)| v as i64 * lights[i as usize][c] as i64).sum();
+                let sum = |c: usize| -> i64 {
+                    slots.iter().map(|&(v, i)| v as i64 * lights[i as usize][c] as i64).sum()
+                };
+                for sum in [0, 1, 2].map(sum) {
                     peak = peak.max(sum.unsigned_abs() as f64);
                 }
             }
