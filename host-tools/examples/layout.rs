@@ -4,9 +4,10 @@
 //! bytes of the values in binary16 over a ratio. The tables are Markdown on standard output; what is done is
 //! told on standard error.
 
+use selvedge::Limits;
+use selvedge::container::directory;
 use selvedge::method::sparse_ensemble::check::LOW_BITS_LIMIT;
 use selvedge::method::sparse_ensemble::{LOW_BITS_BITS, SHIFT_BITS};
-use selvedge::{Limits, directory};
 use selvedge_tools::data::dataset::Dataset;
 use selvedge_tools::error::{Result, ToolError};
 use selvedge_tools::format::model::TransferModel;
