@@ -5,7 +5,7 @@
 //! | [`data`] | datasets of measured or modelled radiance, their directions, levels and pictures |
 //! | [`foreign`], [`synth`] | where data come from: third-party formats, modelled mesostructures |
 //! | [`methods`] | a folder for each method: model, encoder, and everything else that it has |
-//! | [`format`] | a material in memory and its bytes: written, read, trimmed; knows no method |
+//! | [`format`](mod@format) | a material in memory and its bytes: written, read, trimmed; knows no method |
 //! | [`measure`] | errors, similarity and speed of materials and baselines |
 //! | [`check`] | validation, explanations, costs, the conformance suite |
 //! | [`report`], [`show`] | error against run time; pictures and the demo |

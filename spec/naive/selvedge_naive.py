@@ -2285,8 +2285,15 @@ def bytes_of_fences(text_path, fence):
     """The hex dumps of the text behind a fence by their offsets, or None if two do not agree."""
     found = {}
     inside = False
-    with open(text_path, encoding="utf-8") as text:
-        for line in text:
+    # The chapters of methods are texts of their own beside the shared one.
+    chapters = os.path.join(os.path.dirname(os.path.abspath(text_path)), "methods")
+    paths = [text_path]
+    if os.path.isdir(chapters):
+        paths += [os.path.join(chapters, name) for name in sorted(os.listdir(chapters)) if name.endswith(".md")]
+    for path in paths:
+        with open(path, encoding="utf-8") as text:
+            lines = text.readlines()
+        for line in lines:
             if line.startswith("```"):
                 inside = line.strip() == fence
                 continue

@@ -5,7 +5,6 @@
 //! | [`goal`] | what a file has to reach, and the loop that reaches it |
 //! | [`encoder`] | what every encoder is, and encoding with one of them |
 //! | [`auto`] | the choice between methods |
-//! | [`means`] | what the model of a file takes from a dataset whatever its method |
 //! | [`parse`] | values of options in text |
 
 pub mod auto;
