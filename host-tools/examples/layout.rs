@@ -6,6 +6,7 @@
 
 use selvedge::Limits;
 use selvedge::container::directory;
+use selvedge::method::sparse_ensemble::check;
 use selvedge::method::sparse_ensemble::check::LOW_BITS_LIMIT;
 use selvedge::method::sparse_ensemble::{LOW_BITS_BITS, SHIFT_BITS};
 use selvedge_tools::data::dataset::Dataset;
@@ -42,10 +43,10 @@ const KINDS: [u32; 8] = [
     directory::DIRECTIONS,
     directory::MEANS,
     directory::SCALES,
-    directory::ANGULAR,
-    directory::SPATIAL,
-    directory::ATOMS,
-    directory::COEFFICIENTS,
+    check::ANGULAR,
+    check::SPATIAL,
+    check::ATOMS,
+    check::COEFFICIENTS,
 ];
 
 /// Bits of the sections of coefficients: their heads and first bits of records, record heads, positions,
