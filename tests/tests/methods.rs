@@ -7,13 +7,11 @@ use selvedge_tools::methods::{METHODS, by_name, by_number, of};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Features of the core and the firmware that are no method, and what they are.
+/// Features of the core that are no method, and what they are.
 const OTHER_FEATURES: &[(&str, &str)] = &[
     ("default", "what is there without asking"),
     ("all-methods", "every method"),
     ("batch", "the fast paths"),
-    ("planted", "a panic in the firmware, to show that its proof can fail"),
-    ("proof", "the firmware without a panic handler that ends the program"),
 ];
 
 fn root() -> PathBuf {
@@ -96,26 +94,27 @@ fn core_and_kernel_have_the_tools_methods() {
     }
 }
 
-/// `[features]` of a manifest without dependencies' features.
-fn features(manifest: &str) -> BTreeSet<String> {
+/// `[features]` of a manifest, each with what it switches on.
+fn features(manifest: &str) -> BTreeMap<String, String> {
     let text = std::fs::read_to_string(root().join(manifest)).expect("a manifest");
     let (_, rest) = text.split_once("[features]").expect("features");
     let section = rest.split("\n[").next().unwrap_or(rest);
     let lines = section.lines().filter(|line| !line.starts_with('#'));
-    lines.filter_map(|line| line.split_once(" = ").map(|(name, _)| name.to_owned())).collect()
+    lines.filter_map(|line| line.split_once(" = ")).map(|(name, on)| (name.to_owned(), on.to_owned())).collect()
 }
 
 #[test]
 fn every_method_is_a_feature() {
-    for manifest in ["decoder-core/Cargo.toml", "firmware/Cargo.toml"] {
-        let features = features(manifest);
-        for method in METHODS {
-            assert!(features.contains(method.name), "{manifest}: no feature {}", method.name);
-        }
-        for feature in features {
-            let other = OTHER_FEATURES.iter().any(|(name, why)| *name == feature && !why.is_empty());
-            assert!(other || by_name(&feature).is_ok(), "{manifest}: {feature} is no method of the tools");
-        }
+    let manifest = "decoder-core/Cargo.toml";
+    let features = features(manifest);
+    for method in METHODS {
+        let all = features.get("all-methods").expect("all-methods");
+        assert!(features.contains_key(method.name), "{manifest}: no feature {}", method.name);
+        assert!(all.contains(&format!("{:?}", method.name)), "{manifest}: all-methods lacks {}", method.name);
+    }
+    for feature in features.keys() {
+        let other = OTHER_FEATURES.iter().any(|(name, why)| name == feature && !why.is_empty());
+        assert!(other || by_name(feature).is_ok(), "{manifest}: {feature} is no method of the tools");
     }
 }
 
