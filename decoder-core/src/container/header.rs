@@ -116,17 +116,36 @@ impl Header {
 /// Walks 3.1 and 4.1. `None` if what follows could not be found by this header.
 pub(crate) fn check_header(check: &mut Check<'_, '_>, limits: &Limits) -> Option<Header> {
     let length = check.bytes.len().min(u32::MAX as usize) as u32;
+    let header = check_whole(check, length)?;
+    let mut sound = check_sizes(check, &header);
+    check_transfer(check, &header);
+    check_reserved(check);
+    if header.content == CONTENT_DICTIONARY {
+        check_dictionary_fields(check, &header);
+    }
+    // 4.1: the price is compared before anything beyond the directory is touched.
+    sound &= check.ensure(length <= limits.bytes, Rule::LimitBytes, 12, length);
+    sound &=
+        check.ensure(header.operations <= limits.operations, Rule::LimitOperations, 28, header.operations);
+    // At most 2^28 where the sizes are sound.
+    let texels = header.width.saturating_mul(header.height);
+    sound &= check.ensure(texels <= limits.texels, Rule::LimitTexels, 32, texels);
+    (sound && !check.stopped).then_some(header)
+}
+
+/// What makes the bytes a whole file of this format: 3.1-1 to 3.1-6. `None` ends the walk.
+fn check_whole(check: &mut Check<'_, '_>, length: u32) -> Option<Header> {
     if !check.ensure(length >= HEADER_LENGTH, Rule::HeaderTooShort, 0, length) {
         return None;
     }
-    let head = [check.word_at(0), check.word_at(4)];
+    let start = [check.word_at(0), check.word_at(4)];
     let magic = [
         u32::from_le_bytes([MAGIC[0], MAGIC[1], MAGIC[2], MAGIC[3]]),
         u32::from_le_bytes([MAGIC[4], MAGIC[5], MAGIC[6], MAGIC[7]]),
     ];
-    if head != magic {
-        let second = head[0] == magic[0];
-        check.find(Rule::Magic, if second { 4 } else { 0 }, head[second as usize]);
+    if start != magic {
+        let second = start[0] == magic[0];
+        check.find(Rule::Magic, if second { 4 } else { 0 }, start[second as usize]);
         return None;
     }
     let header = Header::read(|offset| check.word_at(offset));
@@ -147,6 +166,11 @@ pub(crate) fn check_header(check: &mut Check<'_, '_>, limits: &Limits) -> Option
     let directory = check.bytes.get(128..directory_end as usize).unwrap_or(&[]);
     let sum = crc32(crc32(0, fields), directory);
     check.ensure(sum == stated, Rule::HeaderChecksum, 124, stated);
+    Some(header)
+}
+
+/// Content, method, sizes and counts; `false` if sections cannot be found by them.
+fn check_sizes(check: &mut Check<'_, '_>, header: &Header) -> bool {
     let known_content = header.content == CONTENT_MATERIAL || header.content == CONTENT_DICTIONARY;
     let wanted =
         if check.part == Part::Dictionary { header.content == CONTENT_DICTIONARY } else { known_content };
@@ -170,6 +194,11 @@ pub(crate) fn check_header(check: &mut Check<'_, '_>, limits: &Limits) -> Option
     for (c, &state) in (0u32..).zip(&header.states) {
         sound &= check.ensure(state <= CHANNEL_FULL, Rule::ChannelState, 56u32.wrapping_add(c), state);
     }
+    sound
+}
+
+/// How values become radiance: nothing is found by these fields.
+fn check_transfer(check: &mut Check<'_, '_>, header: &Header) {
     let transfer_known = header.transfer == TRANSFER_LOG2 || header.transfer == TRANSFER_LINEAR;
     check.ensure(transfer_known, Rule::Transfer, 60, header.transfer);
     check.ensure(header.cosine_included <= 1, Rule::Transfer, 61, header.cosine_included);
@@ -181,13 +210,13 @@ pub(crate) fn check_header(check: &mut Check<'_, '_>, limits: &Limits) -> Option
     };
     check.ensure(parameter_good, Rule::TransferParameter, 64, parameter);
     for (n, &entry) in (0u32..).zip(&header.matrix_q13) {
-        check.ensure(
-            entry != -32768,
-            Rule::ColourMatrix,
-            68u32.wrapping_add(n.wrapping_mul(2)),
-            entry as u32,
-        );
+        let offset = 68u32.wrapping_add(n.wrapping_mul(2));
+        check.ensure(entry != -32768, Rule::ColourMatrix, offset, entry as u32);
     }
+}
+
+/// Fields and words that are reserved are zero.
+fn check_reserved(check: &mut Check<'_, '_>) {
     for (offset, unused) in [
         (54, check.word_at(52) >> 16),
         (59, check.word_at(56) >> 24),
@@ -200,30 +229,25 @@ pub(crate) fn check_header(check: &mut Check<'_, '_>, limits: &Limits) -> Option
         let found = check.word_at(index.wrapping_mul(4));
         check.ensure(found == 0, Rule::HeaderReserved, index.wrapping_mul(4), found);
     }
-    if header.content == CONTENT_DICTIONARY {
-        let plain = [
-            (28, 0, header.operations),
-            (32, 1, header.width),
-            (36, 1, header.height),
-            (48, 1, header.level_count),
-            (53, 1, header.layer_count),
-        ];
-        for (offset, wanted, found) in plain {
-            check.ensure(found == wanted, Rule::DictionaryHeader, offset, found);
-        }
-        for (c, &state) in (0u32..).zip(&header.states) {
-            check.ensure(state != 1, Rule::DictionaryHeader, 56u32.wrapping_add(c), state);
-        }
-        for index in 15u32..22 {
-            let found = check.word_at(index.wrapping_mul(4));
-            check.ensure(found == 0, Rule::DictionaryHeader, index.wrapping_mul(4), found);
-        }
+}
+
+/// What a dictionary has no use for has the value that says so.
+fn check_dictionary_fields(check: &mut Check<'_, '_>, header: &Header) {
+    let plain = [
+        (28, 0, header.operations),
+        (32, 1, header.width),
+        (36, 1, header.height),
+        (48, 1, header.level_count),
+        (53, 1, header.layer_count),
+    ];
+    for (offset, wanted, found) in plain {
+        check.ensure(found == wanted, Rule::DictionaryHeader, offset, found);
     }
-    // 4.1: the price is compared before anything beyond the directory is touched.
-    let affordable = check.ensure(length <= limits.bytes, Rule::LimitBytes, 12, length)
-        & check.ensure(header.operations <= limits.operations, Rule::LimitOperations, 28, header.operations);
-    // At most 2^28 where the sizes are sound.
-    let texels = header.width.saturating_mul(header.height);
-    let affordable = affordable & check.ensure(texels <= limits.texels, Rule::LimitTexels, 32, texels);
-    (sound && affordable && !check.stopped).then_some(header)
+    for (c, &state) in (0u32..).zip(&header.states) {
+        check.ensure(state != 1, Rule::DictionaryHeader, 56u32.wrapping_add(c), state);
+    }
+    for index in 15u32..22 {
+        let found = check.word_at(index.wrapping_mul(4));
+        check.ensure(found == 0, Rule::DictionaryHeader, index.wrapping_mul(4), found);
+    }
 }

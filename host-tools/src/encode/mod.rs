@@ -12,9 +12,14 @@ pub mod encoder;
 pub mod goal;
 pub mod parse;
 
-use crate::methods::sparse_ensemble::encode::encoder::SparseEnsemble;
-use crate::methods::sparse_tensor::encode::encoder::SparseTensor;
+use crate::methods::registry::each_method;
 use encoder::Encoder;
 
-/// The encoders with their default options, a line a method.
-pub static ENCODERS: &[&dyn Encoder] = &[&SparseEnsemble::DEFAULT, &SparseTensor::DEFAULT];
+macro_rules! encoders {
+    ($($module:ident)*) => {
+        /// The encoders of all methods with their default options, in the order of
+        /// [`METHODS`](crate::methods::METHODS).
+        pub static ENCODERS: &[&dyn Encoder] = &[$(&crate::methods::$module::encode::ENCODER),*];
+    };
+}
+each_method!(encoders);

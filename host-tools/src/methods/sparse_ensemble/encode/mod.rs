@@ -22,3 +22,6 @@ pub mod verified;
 pub use options::{Criterion, Encoded, Options};
 pub use prepare::{Prepared, prepare};
 pub use threshold::encode;
+
+/// The encoder with default options.
+pub static ENCODER: encoder::SparseEnsemble = encoder::SparseEnsemble::DEFAULT;

@@ -20,6 +20,9 @@ pub use coder::{encode, encode_fit};
 pub use options::{Encoded, Options, transfer_of};
 pub use shapes::ShapeSearch;
 
+/// The encoder with default options.
+pub static ENCODER: encoder::SparseTensor = encoder::SparseTensor::DEFAULT;
+
 #[cfg(test)]
 mod tests {
     use super::fit::{Shape, Training};
