@@ -1,6 +1,6 @@
 //! What the sparse tensor must reach.
 
-use crate::{Seen, any_direction};
+use crate::{Own, Seen, any_direction};
 use selvedge::Selvedge;
 use selvedge::kernel::position::{Place, axis_at_position};
 use selvedge::method::sparse_tensor::check::{FIBRE_SUM_LIMIT, LIST_SUM_LIMIT};
@@ -13,8 +13,11 @@ use selvedge_tools::math::random::Random;
 use selvedge_tools::methods::sparse_tensor::layout::index_mask;
 use selvedge_tools::methods::sparse_tensor::model::{TensorModel, tensor_of};
 
+/// What the method must reach.
+pub const OWN: Own = Own { name: "sparse-tensor", seeds: 150, list: LIST, reached, made };
+
 /// What must be reached. Words behind a colon are values.
-pub const LIST: &[&str] = &[
+const LIST: &[&str] = &[
     "tensor: no texture",
     "tensor: one channel",
     "tensor: three channels",
@@ -50,7 +53,7 @@ pub const LIST: &[&str] = &[
 ];
 
 /// What a model has and samples of its file reach.
-pub fn reached(model: &MaterialModel, material: &Selvedge<'_>, seen: &mut Seen) {
+fn reached(model: &MaterialModel, material: &Selvedge<'_>, seen: &mut Seen) {
     let tensor = tensor_of(model).expect("a model of this method");
     let channels = tensor.channels.iter().filter(|&&full| full).count();
     seen.say(channels == 0, "tensor: no texture");
@@ -126,6 +129,6 @@ fn of_samples(tensor: &TensorModel, material: &Selvedge<'_>, seen: &mut Seen) {
 }
 
 /// Files that no random number would make: none are needed.
-pub fn made() -> Vec<MaterialModel> {
+fn made() -> Vec<MaterialModel> {
     Vec::new()
 }

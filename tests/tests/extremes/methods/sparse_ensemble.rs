@@ -1,6 +1,6 @@
 //! What the sparse ensemble must reach.
 
-use crate::{Seen, any_direction};
+use crate::{Own, Seen, any_direction};
 use selvedge::Selvedge;
 use selvedge::kernel::material::{CHANNEL_FULL, channel_of};
 use selvedge::kernel::position::{axis_at_position, block_count};
@@ -16,8 +16,11 @@ use selvedge_tools::methods::sparse_ensemble::model::{
     AtomModel, CoefficientsModel, EnsembleModel, FactorModel, RecordModel, ensembles, ensembles_mut,
 };
 
+/// What the method must reach.
+pub const OWN: Own = Own { name: "sparse-ensemble", seeds: 400, list: LIST, reached, made };
+
 /// What must be reached. Words behind a colon are values.
-pub const LIST: &[&str] = &[
+const LIST: &[&str] = &[
     "dictionaries: 1",
     "dictionaries: several",
     "columns: 1",
@@ -46,7 +49,7 @@ pub const LIST: &[&str] = &[
 ];
 
 /// What a model has and samples of its file reach.
-pub fn reached(model: &MaterialModel, material: &Selvedge<'_>, seen: &mut Seen) {
+fn reached(model: &MaterialModel, material: &Selvedge<'_>, seen: &mut Seen) {
     ensembles(model).for_each(|ensemble| of_ensemble(ensemble, seen));
     of_samples(material, seen);
 }
@@ -119,7 +122,7 @@ fn of_samples(material: &Selvedge<'_>, seen: &mut Seen) {
 }
 
 /// Files that no random number would make.
-pub fn made() -> Vec<MaterialModel> {
+fn made() -> Vec<MaterialModel> {
     let ensemble_of = |edit: &dyn Fn(&mut EnsembleModel)| {
         let mut model = example_model();
         edit(ensembles_mut(&mut model).next().expect("full"));
