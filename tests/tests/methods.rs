@@ -100,7 +100,10 @@ fn features(manifest: &str) -> BTreeMap<String, String> {
     let (_, rest) = text.split_once("[features]").expect("features");
     let section = rest.split("\n[").next().unwrap_or(rest);
     let lines = section.lines().filter(|line| !line.starts_with('#'));
-    lines.filter_map(|line| line.split_once(" = ")).map(|(name, on)| (name.to_owned(), on.to_owned())).collect()
+    lines
+        .filter_map(|line| line.split_once(" = "))
+        .map(|(name, on)| (name.to_owned(), on.to_owned()))
+        .collect()
 }
 
 #[test]

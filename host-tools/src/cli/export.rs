@@ -1,6 +1,7 @@
 //! `export`: a dataset or a decoded file in a third-party format.
 
-use super::common::{Given, MEMORY, Threads, check_applies, check_output};
+use super::common::{Given, Threads};
+use super::exchange::{MEMORY, check_applies, check_output};
 use super::parse;
 use crate::data::expand::expand;
 use crate::error::{Result, ToolError};
