@@ -150,7 +150,7 @@ fn main() {
     }
     let (folder, size) = match std::env::var_os("SELVEDGE_DATA") {
         Some(data) => (PathBuf::from(data).join("sparsebtf"), None),
-        None => (Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/sparsebtf"), None),
+        None => (Path::new(env!("CARGO_MANIFEST_DIR")).join("data/sparsebtf"), None),
     };
     println!("target features: avx2 {}, data {}", cfg!(target_feature = "avx2"), folder.display());
     let temporary = tempfile::tempdir().expect("a folder");

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 /// The excerpt in the repository.
 pub fn excerpt_folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("data/sparsebtf")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../host-tools/data/sparsebtf")
 }
 
 /// The file that is imported from it.

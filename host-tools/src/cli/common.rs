@@ -96,28 +96,6 @@ pub fn with_material<T>(
     })?)
 }
 
-/// Bytes of images held at once.
-pub const MEMORY: usize = 256 << 20;
-
-/// Refuses an option that would do nothing.
-pub fn check_applies(option: &str, is_given: bool, applies: bool, to: &str) -> Result<()> {
-    if is_given && !applies { Err(ToolError::Usage(format!("{option} is for {to} alone"))) } else { Ok(()) }
-}
-
-/// Refuses an output that could not be written after hours of work, or would take the place of its source.
-pub fn check_output(source: &Path, output: &Path, is_folder: bool) -> Result<()> {
-    let refuse = |why: &str| Err(ToolError::Usage(format!("{}: {why}", output.display())));
-    if !is_folder && output.is_dir() {
-        return refuse("this is a folder; a file is written");
-    }
-    let is_same =
-        source == output || source.canonicalize().is_ok_and(|a| output.canonicalize().is_ok_and(|b| a == b));
-    if is_same {
-        return refuse("this is the source");
-    }
-    Ok(())
-}
-
 /// Warns of a file whose triangulation differs from the one that this tool computes.
 pub fn warn_of_triangles(path: &Path, file: &Selvedge<'_>) {
     if !read::same_triangles(file) {

@@ -1,6 +1,7 @@
 //! `export`: a dataset or a decoded file in a third-party format.
 
-use super::common::{Given, MEMORY, Threads, check_applies, check_output};
+use super::common::{Given, Threads};
+use super::exchange::{MEMORY, check_applies, check_output};
 use super::parse;
 use crate::data::expand::expand;
 use crate::error::{Result, ToolError};
@@ -99,7 +100,7 @@ pub fn run(args: Arguments) -> Result<u8> {
                 memory: MEMORY,
             };
             let exported = ubo::export(&dataset, &args.output, &options, &writing)?;
-            count_clipped(exported.cut);
+            count_clipped(exported.clipped);
             if let (count @ 1.., worst) = exported.moved {
                 notes.push(format!(
                     "{count} directions are not of whole degrees: the names are up to {worst:.2} degrees off"

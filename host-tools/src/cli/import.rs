@@ -1,7 +1,7 @@
 //! `import`: a dataset of measured data, or a file of published coefficients.
 
-use super::common::{Threads, check_applies, check_output};
-use super::parse;
+use super::common::Threads;
+use super::exchange::{self, check_applies, check_output};
 use crate::data::dataset::Sample;
 use crate::data::picture;
 use crate::error::{Result, ToolError};
@@ -11,7 +11,6 @@ use crate::foreign::{self, ImportOptions, Kind, btf, images};
 use crate::format::write;
 use crate::methods::sparse_ensemble::sparsebtf;
 use crate::progress::Progress;
-use crate::show::demo;
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 
@@ -27,7 +26,7 @@ pub struct Arguments {
     #[arg(long)]
     material: Option<String>,
     /// SparseBTF: blocks along x and y, if the image is not square, as 40x30
-    #[arg(long, value_parser = parse::blocks)]
+    #[arg(long, value_parser = exchange::blocks)]
     blocks: Option<[usize; 2]>,
     /// SparseBTF: bits of a quantised coefficient, 1 to 16; 10 if not given
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=16))]
@@ -79,7 +78,7 @@ pub struct DataArgs {
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     memory: Option<u32>,
     /// Write the height map of a .btf to an .exr, values unchanged
-    #[arg(long, value_parser = parse::exr)]
+    #[arg(long, value_parser = exchange::exr)]
     height_map: Option<PathBuf>,
     /// Report how long each step took
     #[arg(long)]
@@ -216,7 +215,7 @@ fn import_coefficients(args: &Arguments) -> Result<()> {
         }
         (_, there) => return Err(ToolError::Usage(format!("--material says which: {}", there.join(", ")))),
     };
-    let value_bits = args.value_bits.unwrap_or(demo::VALUE_BITS);
+    let value_bits = args.value_bits.unwrap_or(sparsebtf::VALUE_BITS);
     let model = sparsebtf::read_material(folder, &name, args.blocks)?.to_model(value_bits)?;
     let Some(dictionary) = &args.dictionary else {
         return files::write(output, &write::write_material(&model));

@@ -3,25 +3,39 @@
 //! Exit codes: 0 good, 1 bad usage, 2 I/O, 3 invalid file, 4 over limits, 5 unsupported. One file a command,
 //! with its options and what it does with them.
 
+#[cfg(feature = "report")]
 mod bench;
 mod blend;
 mod common;
 mod compare;
 mod conform;
 mod decode;
+#[cfg(feature = "import")]
 mod demo;
 mod encode;
+#[cfg(feature = "import")]
+mod exchange;
 mod explain;
+#[cfg(feature = "import")]
 mod export;
+#[cfg(feature = "import")]
 mod import;
 mod info;
 mod kernel;
+#[cfg(not(all(feature = "import", feature = "report")))]
+mod lacking;
 mod parse;
+#[cfg(feature = "report")]
 mod report;
 mod synth;
 mod train;
 mod trim;
 mod validate;
+
+#[cfg(not(feature = "report"))]
+use lacking::{bench, report};
+#[cfg(not(feature = "import"))]
+use lacking::{demo, export, import};
 
 use crate::error::Result;
 use clap::{Parser, Subcommand};

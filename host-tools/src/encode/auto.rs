@@ -156,10 +156,12 @@ mod tests {
             reached.into_iter().next()
         }
 
+        #[cfg(feature = "cli")]
         fn arguments(&self, command: clap::Command) -> clap::Command {
             command
         }
 
+        #[cfg(feature = "cli")]
         fn configured(&self, _: &clap::ArgMatches) -> Result<Box<dyn Encoder>> {
             Err(ToolError::Usage("no options".into()))
         }

@@ -33,7 +33,8 @@ const XYZ: [[f32; 3]; 3] = [
 ];
 
 /// What the three numbers of an image are.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Colours {
     /// As the image says: XYZ where its channels are called so, else RGB.
     #[default]

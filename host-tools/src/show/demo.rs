@@ -9,7 +9,7 @@ use crate::error::{Result, ToolError};
 use crate::files;
 use crate::format::bits::hex;
 use crate::format::write;
-use crate::methods::sparse_ensemble::sparsebtf::{AuthorsMaterial, read_material};
+use crate::methods::sparse_ensemble::sparsebtf::{AuthorsMaterial, VALUE_BITS, read_material};
 use crate::show::ball::{decode_picture, render_ball};
 use crate::show::story;
 use selvedge::{Direction, Limits, Selvedge};
@@ -19,7 +19,7 @@ use std::path::Path;
 
 macro_rules! excerpt {
     ($($name:literal),* $(,)?) => {
-        &[$(($name, include_bytes!(concat!("../../../tests/data/sparsebtf/", $name)).as_slice())),*]
+        &[$(($name, include_bytes!(concat!("../../data/sparsebtf/", $name)).as_slice())),*]
     };
 }
 
@@ -37,9 +37,6 @@ pub const EXCERPT: &[(&str, &[u8])] = excerpt![
     "felt05_mean_std.bin",
     "xyz_loc.bin",
 ];
-
-/// Bits of a value that the demo imports with.
-pub const VALUE_BITS: u32 = 10;
 
 /// Error of a decoded channel against the authors' values.
 #[derive(Clone, Copy, Debug, Default)]

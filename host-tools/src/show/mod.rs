@@ -1,5 +1,7 @@
 //! Pictures of balls, and the demo.
 
 pub mod ball;
+#[cfg(all(feature = "cli", feature = "import"))]
 pub mod demo;
+#[cfg(all(feature = "cli", feature = "import"))]
 pub mod story;

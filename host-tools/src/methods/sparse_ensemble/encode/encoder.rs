@@ -1,5 +1,6 @@
 //! The encoder of the sparse ensemble behind the trait of encoders.
 
+#[cfg(feature = "cli")]
 use super::arguments::Arguments;
 use super::options::{Criterion, Encoded, Options};
 use super::prepare::prepare;
@@ -15,6 +16,7 @@ use crate::methods::sparse_ensemble::dictionary_file::DictionaryFile;
 use crate::methods::sparse_ensemble::train;
 use crate::methods::sparse_tensor::encode::transfer_of;
 use crate::progress::Observer;
+#[cfg(feature = "cli")]
 use clap::{ArgMatches, Args as _, Command, FromArgMatches as _};
 use std::sync::Arc;
 
@@ -164,10 +166,12 @@ impl Encoder for SparseEnsemble {
         verified::choose(goal, reached, |e| (e.metrics.log_rms, e.bytes.len(), e.operations))
     }
 
+    #[cfg(feature = "cli")]
     fn arguments(&self, command: Command) -> Command {
         Arguments::augment_args(command)
     }
 
+    #[cfg(feature = "cli")]
     fn configured(&self, matches: &ArgMatches) -> Result<Box<dyn Encoder>> {
         let arguments =
             Arguments::from_arg_matches(matches).map_err(|error| ToolError::Usage(error.to_string()))?;

@@ -6,6 +6,7 @@
 //! coefficient is the error of leaving it out. [`verified`] decodes what comes out and encodes again until
 //! the goal holds; [`encoder`] is all of it behind the trait of encoders.
 
+#[cfg(feature = "cli")]
 mod arguments;
 pub mod assemble;
 pub mod candidates;

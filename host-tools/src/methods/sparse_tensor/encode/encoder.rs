@@ -1,5 +1,6 @@
 //! The encoder of the sparse tensor behind the trait of encoders.
 
+#[cfg(feature = "cli")]
 use super::arguments::Arguments;
 use super::coder::encode_fit;
 use super::fit::{Fit, Shape, Training, fit};
@@ -11,6 +12,7 @@ use crate::encode::goal::{Goal, Steering, Task, Verified, domain_name, meet};
 use crate::error::{Result, ToolError};
 use crate::measure::baseline::pca::{Domain, Pca, pca_within};
 use crate::progress::Observer;
+#[cfg(feature = "cli")]
 use clap::{ArgMatches, Args as _, Command, FromArgMatches as _};
 
 /// Name of the method.
@@ -180,10 +182,12 @@ impl Encoder for SparseTensor {
         reached.into_iter().next()
     }
 
+    #[cfg(feature = "cli")]
     fn arguments(&self, command: Command) -> Command {
         Arguments::augment_args(command)
     }
 
+    #[cfg(feature = "cli")]
     fn configured(&self, matches: &ArgMatches) -> Result<Box<dyn Encoder>> {
         let arguments =
             Arguments::from_arg_matches(matches).map_err(|error| ToolError::Usage(error.to_string()))?;

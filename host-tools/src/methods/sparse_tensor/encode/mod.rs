@@ -6,6 +6,7 @@
 //! anything is decoded. [`shapes`] chooses the sizes of dictionaries and lists; [`encoder`] is all of it
 //! behind the trait of encoders.
 
+#[cfg(feature = "cli")]
 mod arguments;
 mod coder;
 pub mod encoder;
