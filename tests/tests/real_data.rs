@@ -8,7 +8,7 @@ use selvedge_tools::format::write;
 use selvedge_tools::gpu::runner::{Gpu, Query, backends};
 use selvedge_tools::math::random::Random;
 use selvedge_tools::methods::sparse_ensemble::sparsebtf;
-use selvedge_tools::show::demo::channel_error;
+use selvedge_tools::show::excerpt::channel_error;
 use std::f64::consts::LN_2;
 
 /// Natural logarithm of a Q20 value.
