@@ -4,4 +4,6 @@ pub mod ball;
 #[cfg(all(feature = "cli", feature = "import"))]
 pub mod demo;
 #[cfg(all(feature = "cli", feature = "import"))]
-pub mod story;
+pub mod excerpt;
+#[cfg(all(feature = "cli", feature = "import"))]
+mod pipeline;
