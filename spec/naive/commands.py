@@ -4,14 +4,14 @@ import os
 import struct
 import sys
 
-from chapters.conventions import wraps
-from chapters.file import DICTIONARY
+from chapters.conventions import MASK, as_i32, wraps
 from chapters.cost import Limits
 from chapters.directions import direction_of_binary32
+from chapters.file import DICTIONARY
+from chapters.material import Material
+from chapters.opening import check, open_file
 from chapters.position import fraction_of_binary32
 from methods.sparse_tensor import FIBRES, LIGHT_ATOMS, LISTS
-from chapters.opening import check, open_file
-from chapters.material import Material
 
 
 def read_bytes(path):
@@ -25,6 +25,8 @@ def options_of(arguments):
     at = 0
     while at < len(arguments):
         if arguments[at].startswith("--"):
+            if at + 1 == len(arguments):
+                raise ValueError("%s needs a value" % arguments[at])
             options[arguments[at][2:]] = arguments[at + 1]
             at += 2
         else:
@@ -48,8 +50,15 @@ def answer(material, line):
     """One line of `samples`."""
     word, *rest = line.split()
     n = [int(number) for number in rest]
-    sizes = dict(point=4, texel=8, filtered=9, trilinear=9, light=3, view=3, direction=3, fraction=1, layers=1)
-    if sizes.get(word) != len(n):
+    # 11.1: how many unsigned words, then how many signed ones
+    shapes = dict(
+        point=(4, 0), texel=(2, 6), filtered=(3, 6), trilinear=(3, 6),
+        light=(0, 3), view=(0, 3), direction=(3, 0), fraction=(1, 0), layers=(1, 0),
+    )
+    unsigned, signed = shapes.get(word, (0, 0))
+    if len(n) != unsigned + signed or word not in shapes:
+        return "error"
+    if any(not 0 <= x <= MASK for x in n[:unsigned]) or any(x != as_i32(x & MASK) for x in n[unsigned:]):
         return "error"
     if word in ("light", "view"):
         directions = material.file.light_set if word == "light" else material.file.view_set
@@ -60,10 +69,8 @@ def answer(material, line):
     if word == "fraction":
         return "%08x" % fraction_of_binary32(n[0])
     if word == "layers":
-        if not 1 <= n[0] <= material.file.layer_count:
-            return "error"
-        material.layer_limit = n[0]
-        return "layers %d" % n[0]
+        material.limit_layers(n[0])
+        return "layers %d" % material.layer_limit
     if word == "point":
         result = material.point(*n)
     elif word == "texel":
@@ -138,11 +145,12 @@ def command_vectors(folder):
             if difference is not None:
                 counts[fields[0]][1] += 1
                 print("%s\t%s\t%s" % (fields[0], fields[1], difference), flush=True)
+    (valid, valid_wrong), (invalid, invalid_wrong) = counts["valid"], counts["invalid"]
     print(
-        "%d valid, %d of them differ; %d invalid for %d rules, %d of them differ; "
-        "%d values left their word" % (*counts["valid"], counts["invalid"][0], len(rules), counts["invalid"][1], wraps[0])
+        "%d valid, %d of them differ; %d invalid for %d rules, %d of them differ; %d values left their word"
+        % (valid, valid_wrong, invalid, len(rules), invalid_wrong, wraps[0])
     )
-    return 1 if counts["valid"][1] or counts["invalid"][1] else 0
+    return 1 if valid_wrong or invalid_wrong else 0
 
 
 def texts_of(text_path):
@@ -179,7 +187,8 @@ def command_example(text_path, out_path):
         return 1
     length = struct.unpack("<I", bytes(found[at] for at in range(12, 16)))[0]
     missing = [at for at in range(length) if at not in found]
-    print("%d bytes from the text, %d not shown: %s" % (len(found), len(missing), [hex(at) for at in missing]))
+    shown = (len(found), len(missing), [hex(at) for at in missing])
+    print("%d bytes from the text, %d not shown: %s" % shown)
     with open(out_path, "wb") as out:
         out.write(bytes(found.get(at, 0) for at in range(length)))
     return 0
@@ -193,8 +202,9 @@ def command_tensor_example(text_path, path):
     data = read_bytes(path)
     wrong = [at for at in sorted(found) if at >= len(data) or data[at] != found[at]]
     file = open_file(data)
-    sections = [file.section(kind) for kind in (LIGHT_ATOMS, FIBRES, LISTS)]
-    shown = {at for section in sections for at in range(section.offset, section.offset + section.length)}
+    shown = set()
+    for section in [file.section(kind) for kind in (LIGHT_ATOMS, FIBRES, LISTS)]:
+        shown.update(range(section.offset, section.offset + section.length))
     print(
         "%d bytes from the text, %d differ: %s; of the three sections %d are not shown"
         % (len(found), len(wrong), [hex(at) for at in wrong], len(shown - set(found)))

@@ -42,7 +42,7 @@ begin with # are skipped. The answer has one line for each line asked.
   fraction bits                         (binary32 pattern, 6.1-2)
       -> the fraction as eight hexadecimal digits
   layers n
-      -> "layers n"; from here on layer_limit is n
+      -> "layers n"; from here on layer_limit is n, moved into its range (10.8-2)
 
 A line that is not understood is answered with "error".
 """
@@ -70,8 +70,8 @@ __all__ = ["Finding", "Limits", "Material", "check", "main"]
 
 
 def main(arguments):
-    plain, options = options_of(arguments)
     try:
+        plain, options = options_of(arguments)
         if plain[0:1] == ["check"] and len(plain) == 2:
             return command_check(plain[1], options)
         if plain[0:1] == ["digest"] and len(plain) == 2:

@@ -1,1 +1,1 @@
-"""The specification, a module for each chapter; each method is one module and one line in `methods`."""
+"""The shared chapters of the specification (1 to 9, 11 and 16); those of the methods are in `methods`."""

@@ -166,9 +166,8 @@ class Directions:
 
     def read(self):
         file = self.file
-        self.points = [
-            (file.i16(self.points_at + 8 * n), file.i16(self.points_at + 8 * n + 2)) for n in range(self.count)
-        ]
+        places = [self.points_at + 8 * n for n in range(self.count)]
+        self.points = [(file.i16(at), file.i16(at + 2)) for at in places]
         self.cosines = [file.u32(self.points_at + 8 * n + 4) for n in range(self.count)]
         self.triangles = []
         for n in range(self.triangle_count):
@@ -290,7 +289,9 @@ class Directions:
             # only cells that the box of the triangle meets can meet the triangle
             for cell_y in range(grid_cell(min(ys), size), grid_cell(max(ys), size) + 1):
                 for cell_x in range(grid_cell(min(xs), size), grid_cell(max(xs), size) + 1):
-                    if triangle not in listed[cell_y * size + cell_x] and meets(corners, cell_x, cell_y, size):
+                    if triangle in listed[cell_y * size + cell_x]:
+                        continue
+                    if meets(corners, cell_x, cell_y, size):
                         file.fail("5.5-4", self.section.offset + 16, self.candidate_count)
 
     def corners(self, triangle):

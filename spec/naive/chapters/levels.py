@@ -1,4 +1,5 @@
-"""Chapter 9: levels. The samples between levels are in `interpolation`."""
+"""Chapter 9: levels. The samples between levels are in `material`."""
+
 
 def level_size(size, level):
     """9.1-1."""

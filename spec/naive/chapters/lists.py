@@ -1,5 +1,6 @@
 """Chapter 16: lists and layers."""
 
+
 class Stream:
     """16.1: a stream of bits within a section; a subclass sets `file`, `stream`, `end` and `bits`."""
 

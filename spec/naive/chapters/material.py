@@ -1,15 +1,15 @@
 """Chapter 8 and 9.2: the value of a channel (8.3), and the samples that a caller can ask for."""
 
-from chapters.conventions import ONE_Q15, VALUE_BOUND, i32
-from chapters.fixed_point import clamp_magnitude, multiply_q15
-from chapters.file import MEAN, MEANS, MISSING, SCALES
-from chapters.position import Place, axis_of_position, axis_of_texel
 from chapters.colour import colour
+from chapters.conventions import ONE_Q15, VALUE_BOUND, i32
+from chapters.file import MEAN, MEANS, MISSING, SCALES
+from chapters.fixed_point import clamp_magnitude, multiply_q15
+from chapters.interpolation import Pairs
 from chapters.levels import level_size
+from chapters.opening import open_file
+from chapters.position import Place, axis_of_position, axis_of_texel
 from chapters.results import decode_digest
 from methods import method_of
-from chapters.interpolation import Pairs
-from chapters.opening import open_file
 
 
 class Material:
@@ -17,11 +17,13 @@ class Material:
 
     def __init__(self, data, dictionary=None, limits=None, layer_limit=None):
         self.file = file = open_file(data, dictionary, limits, as_material=True)
-        self.layer_limit = file.layer_count if layer_limit is None else layer_limit  # 10.8-2
-        if not 1 <= self.layer_limit <= file.layer_count:
-            raise ValueError("layer_limit is 1 to %d" % file.layer_count)
+        self.limit_layers(file.layer_count if layer_limit is None else layer_limit)
         self.means = {c: Pairs(file, file.section(MEANS, c)) for c in range(3) if file.section(MEANS, c)}
         self.scales = {c: Pairs(file, file.section(SCALES, c)) for c in range(3) if file.section(SCALES, c)}
+
+    def limit_layers(self, layer_limit):
+        """10.8-2: a choice out of range is moved to the nearest."""
+        self.layer_limit = max(1, min(layer_limit, self.file.layer_count))
 
     def textures(self, place, light, view):
         """8.3-3: the textures of the full channels, by the method of the file."""

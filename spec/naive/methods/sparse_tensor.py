@@ -386,5 +386,6 @@ def examples():
         ("12.4", (list_low_bits(2, 1), list_coefficient(63, 6), list_coefficient(10, 6)), (0, 32256, -22016)),
         ("12.5-1", [tensor.blended_light_atom(n, taps_of_sample(1))[0] for n in (0, 2)], [400 * 32, 60 * 32]),
         ("12.5-3", [angular_atoms.angular(n)[0:2] for n in (0, 1)], [[0x23B5, 0x02BF], [0x4F59, -0x1F48]]),
-        ("12.5-6", layer_textures(tensor, lists, 3, angular_atoms, one_texel, one_texel)[0:2], [0x43F2, 0x69B2]),
+        ("12.5-6", layer_textures(tensor, lists, 3, angular_atoms, one_texel, one_texel)[0:2],
+         [0x43F2, 0x69B2]),
     ]
