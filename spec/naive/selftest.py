@@ -4,9 +4,19 @@ import pkgutil
 
 import methods
 from chapters.colour import linear_transfer, log2_transfer, matrix_row
-from chapters.conventions import MASK, ONE_Q15, as_i32, crc32
-from chapters.directions import between_q18, cell_range, clamp_direction, direction_of_binary32, grid_cell
-from chapters.file import MEANS, SCALES
+from chapters.conventions import MASK, ONE_Q15, Finding, as_i32, crc32
+from chapters.directions import (
+    Directions,
+    between_q18,
+    cell_range,
+    clamp_direction,
+    direction_of_binary32,
+    dot_product,
+    grid_cell,
+    reciprocal_of,
+    shift_of,
+)
+from chapters.file import MEANS, SCALES, File
 from chapters.fixed_point import (
     assemble_binary32,
     divide,
@@ -35,6 +45,45 @@ def faults_of_methods():
             if row.kind not in (MEANS, SCALES) and row.kind >> 8 != method.NUMBER:
                 faults.append("%s has a section of kind %#06x" % (method.NAME, row.kind))
     return faults
+
+
+def finding_on_hull(points, triangles, hull):
+    """5.7: the rule and the number that are found in the hull and the cover of a set, or None."""
+    directions = Directions.__new__(Directions)
+    directions.file = File(b"", "file")
+    directions.points, directions.count = points, len(points)
+    directions.triangles = [(a, b, c, 0, 0) for a, b, c in triangles]
+    directions.hull = []
+    for n, a in enumerate(hull):
+        end = points[hull[(n + 1) % len(hull)]]
+        whole = dot_product(points[a], end, end)
+        directions.hull.append((a, shift_of(whole), reciprocal_of(whole)))
+    directions.triangle_count, directions.hull_count = len(triangles), len(hull)
+    directions.triangles_at, directions.hull_at = 0, 0
+    try:
+        directions.check_hull()
+        directions.check_cover()
+    except Finding as finding:
+        return finding.rule, finding.found
+    return None
+
+
+def examples_of_hulls():
+    """5.7: the numeric examples of findings."""
+    points = [(0, 0), (8000, 0), (0, 8000), (-8000, 0), (0, -8000)]
+    fan = [(0, 1, 2), (0, 2, 3), (0, 3, 4)]
+    pentagon = [(8000, 0), (2472, 7608), (-6472, 4702), (-6472, -4702), (2472, -7608)]
+    inner = [(0, 8000), (-7000, -4000), (7000, -4000), (0, 100)]
+    six = [(-8000, -8000), (8000, -8000), (8000, 8000), (-8000, 8000), (-1000, -1000), (2000, 1000)]
+    overlapping = [(0, 1, 2), (0, 2, 3), (0, 5, 4), (1, 3, 4), (1, 5, 3), (2, 4, 5)]
+    return [
+        ("5.7", finding_on_hull(points, fan + [(0, 4, 1)], [1, 2, 3, 4]), None),
+        ("5.7-7", finding_on_hull(points, fan + [(0, 4, 1)], [1, 4, 3, 2]), ("5.7-7", 0)),
+        ("5.7-7", finding_on_hull(pentagon, fan, [0, 2, 4, 1, 3]), ("5.7-7", 8)),
+        ("5.7-8", finding_on_hull(points, fan + [(1, 2, 3)], [1, 2, 3, 4]), ("5.7-8", 0)),
+        ("5.7-8", finding_on_hull(inner, [(0, 1, 3), (0, 3, 2), (1, 2, 3)], [0, 1, 3]), ("5.7-8", 1)),
+        ("5.7-8", finding_on_hull(six, overlapping, [0, 1, 2, 3]), ("5.7-8", 12)),
+    ]
 
 
 def command_selftest():
@@ -79,6 +128,7 @@ def command_selftest():
         ("9.1", [(level_size(3, n), level_size(2, n)) for n in range(3)], [(3, 2), (2, 1), (1, 1)]),
         ("9.2", 0x100 + multiply_q15(0x200, 0x4000), 0x200),
     ]
+    pairs += examples_of_hulls()
     for method in METHODS.values():
         pairs += method.examples()
     faults = faults_of_methods()
