@@ -8,6 +8,7 @@
 use crate::check::extreme::extreme;
 use crate::data::dataset::{Dataset, Description, Sample};
 use crate::data::directions;
+use crate::data::transfer::Domain;
 use crate::encode::goal::Target;
 use crate::error::{Result, ToolError};
 use crate::format::triangulate::{project, triangulate};
@@ -15,7 +16,7 @@ use crate::format::write::write_material;
 use crate::math::ksvd::{Pursuit, Rows, code_all, dot, gram, iterate, normalise, pursue};
 use crate::math::linear::{eigenbasis, nearest_orthogonal, orthonormal, product_at};
 use crate::math::random::Random;
-use crate::measure::baseline::pca::{Domain, pca};
+use crate::measure::baseline::pca::components as pca;
 use crate::measure::compare::{Source, compare, query};
 use crate::methods::METHODS;
 use crate::methods::sparse_ensemble::encode::{self, prepare};

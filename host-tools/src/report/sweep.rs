@@ -2,14 +2,16 @@
 
 use super::{Bench, HeldOut, Kind, Line, REVISION, Request, Store, Subject, forget_peak, peak_memory};
 use crate::data::dataset::{Dataset, Description, Writer};
-use crate::encode::goal::{Target, open_made};
+use crate::data::transfer::Domain;
+use crate::encode::goal::Target;
 use crate::error::{Result, ToolError};
 use crate::files;
 use crate::measure::baseline::data::Uncompressed;
 use crate::measure::baseline::decoder::{Decoder, Locator};
-use crate::measure::baseline::pca::{Domain, pca};
+use crate::measure::baseline::pca::components as pca;
 use crate::measure::baseline::{clusters, published, tucker};
 use crate::measure::speed::{self, Adapter};
+use crate::measure::verify::open_made;
 use crate::methods::sparse_ensemble::encode::{self, prepare};
 use crate::methods::sparse_tensor;
 use crate::methods::sparse_tensor::encode::fit;
