@@ -27,6 +27,39 @@ pub fn full_data_folder(what_is_skipped: &str) -> Option<PathBuf> {
     folder
 }
 
+/// The chapters of the methods by their numbers: the name of the method, and its text.
+///
+/// The number is in the first line, such as `# 10 Sparse ensemble`.
+pub fn method_chapters() -> Vec<(String, String)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../spec/methods");
+    let listed = std::fs::read_dir(&folder).expect("spec/methods");
+    let mut chapters: Vec<(u32, String, String)> = listed
+        .map(|entry| {
+            let path = entry.expect("an entry").path();
+            let text = std::fs::read_to_string(&path).expect("a method's chapter");
+            let number = text.strip_prefix("# ").and_then(|rest| rest.split(' ').next()?.parse().ok());
+            let name = path.file_stem().expect("a name").to_string_lossy().into_owned();
+            (number.unwrap_or_else(|| panic!("{name}: no chapter number")), name, text)
+        })
+        .collect();
+    chapters.sort();
+    assert!(chapters.windows(2).all(|pair| pair[0].0 < pair[1].0), "a chapter number is used twice");
+    chapters.into_iter().map(|(_, name, text)| (name, text)).collect()
+}
+
+/// The conformance table: that of the shared chapters, then those of the methods' chapters by their numbers.
+pub fn conformance_table() -> String {
+    let spec = Path::new(env!("CARGO_MANIFEST_DIR")).join("../spec");
+    let read = |path: PathBuf| {
+        std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+    };
+    let mut table = read(spec.join("conformance.md"));
+    for (name, _) in method_chapters() {
+        table += &read(spec.join("conformance").join(name + ".md"));
+    }
+    table
+}
+
 /// A number from the environment, for longer runs.
 pub fn setting(name: &str, default: usize) -> usize {
     std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)

@@ -35,25 +35,10 @@ fn files_below(folder: &Path, extensions: &[&str]) -> Vec<PathBuf> {
     files
 }
 
-/// The chapter number of a method's text, from its first line, such as `# 10 Sparse ensemble`.
-fn chapter_number(text: &str) -> Option<u32> {
-    text.lines().next()?.strip_prefix("# ")?.split(' ').next()?.parse().ok()
-}
-
 /// The specification: the shared chapters, then the chapters of the methods by their numbers.
 fn specification() -> String {
-    let mut chapters: Vec<(u32, String)> = files_below(&path_of("spec/methods"), &["md"])
-        .iter()
-        .map(|path| {
-            let text = std::fs::read_to_string(path).expect("a method's chapter");
-            let number = chapter_number(&text);
-            (number.unwrap_or_else(|| panic!("{}: no chapter number", path.display())), text)
-        })
-        .collect();
-    chapters.sort();
-    assert!(chapters.windows(2).all(|pair| pair[0].0 < pair[1].0), "a chapter number is used twice");
     let mut text = read("spec/selvedge-1.md");
-    for (_, chapter) in chapters {
+    for (_, chapter) in selvedge_tests::method_chapters() {
         text.push('\n');
         text.push_str(&chapter);
     }
@@ -123,7 +108,7 @@ fn every_rule_that_a_comment_cites_is_in_the_specification() {
 
 #[test]
 fn the_conformance_table_has_a_row_for_every_rule() {
-    let table = read("spec/conformance.md");
+    let table = selvedge_tests::conformance_table();
     let rows: Vec<Vec<String>> = table
         .lines()
         .filter(|line| line.starts_with("| ") && line.as_bytes().get(2).is_some_and(u8::is_ascii_digit))

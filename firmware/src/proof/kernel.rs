@@ -170,5 +170,5 @@ fn registry() {
             }
         }
     }
-    black_box(selvedge::method::layer_instance(n(), n(), n()));
+    black_box(selvedge::method::rule::layer_instance(n(), n(), n()));
 }

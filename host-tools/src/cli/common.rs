@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 /// Number of threads; results do not depend on it.
 #[derive(Args)]
 pub struct Threads {
-    /// Threads, all cores if not given; output does not depend on it
+    /// Threads; all cores if not given. Results do not depend on it
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
 }
@@ -29,9 +29,9 @@ impl Threads {
 /// A file and its external dictionary.
 #[derive(Args)]
 pub struct FileArgs {
-    /// The file, - for standard input
+    /// The file; - for standard input
     pub file: PathBuf,
-    /// Its external dictionary
+    /// External dictionary of the file
     #[arg(long)]
     pub dictionary: Option<PathBuf>,
     #[command(flatten)]
@@ -41,13 +41,13 @@ pub struct FileArgs {
 /// Resource limits.
 #[derive(Args)]
 pub struct LimitArgs {
-    /// Refuse larger files, bytes
+    /// Refuse files of more bytes
     #[arg(long, default_value_t = Limits::default().bytes)]
     max_bytes: u32,
     /// Refuse files that state more operations per sample
     #[arg(long, default_value_t = Limits::default().operations)]
     max_operations: u32,
-    /// Refuse larger images, texels
+    /// Refuse images of more texels
     #[arg(long, default_value_t = Limits::default().texels)]
     max_texels: u32,
 }

@@ -32,27 +32,27 @@ pub struct Arguments {
     /// Metric that --warn and --fail are thresholds of
     #[arg(long, value_enum, default_value = "largest")]
     by: Limited,
-    /// Warn above
+    /// Warn if the metric is above this
     #[arg(long, default_value_t = 1e-6)]
     warn: f64,
-    /// Fail above
+    /// Fail if the metric is above this
     #[arg(long, default_value_t = 1e-6)]
     fail: f64,
     /// Peak value of the PSNR; the largest value of the reference if not given
     #[arg(long, value_parser = positive)]
     peak: Option<f64>,
-    /// As JSON
+    /// Print as JSON
     #[arg(long)]
     json: bool,
-    /// Write other, reference and the error in false colour side by side to this picture
+    /// Write a picture of the material under test, the reference and the error in false colour, side by side
     #[arg(long)]
     picture: Option<PathBuf>,
     /// Light of the picture: angle from the normal and azimuth, degrees; snapped to the nearest direction of
     /// the reference
-    #[arg(long, default_value = "30,0", value_parser = parse::angles, allow_hyphen_values = true)]
+    #[arg(long, default_value = "30,0", value_name = "POLAR,AZIMUTH", value_parser = parse::angles, allow_hyphen_values = true)]
     light: Direction,
     /// View of the picture
-    #[arg(long, default_value = "0,0", value_parser = parse::angles, allow_hyphen_values = true)]
+    #[arg(long, default_value = "0,0", value_name = "POLAR,AZIMUTH", value_parser = parse::angles, allow_hyphen_values = true)]
     view: Direction,
     /// Error of ln(x + offset) that is white in the picture
     #[arg(long, default_value_t = 1.0, value_parser = positive)]

@@ -66,7 +66,7 @@ struct Shared {
     /// Error domain of --rmse
     #[arg(long, value_enum, default_value = "log")]
     domain: DomainName,
-    /// Method of the file
+    /// Encoding method
     #[arg(long, value_parser = methods(), default_value = ENCODERS[0].method())]
     method: String,
     /// Objective of --method auto among files that reach the goal; error if the goal is a size, bytes if it
@@ -76,7 +76,7 @@ struct Shared {
     /// Budget: operations of a filtered sample that the file may state
     #[arg(long)]
     operations: Option<u32>,
-    /// Domain that is coded; log if not given, both with --method auto
+    /// Domain that is encoded; log if not given, both with --method auto
     #[arg(long, value_enum)]
     transfer: Option<DomainName>,
     /// Offset of the logarithm; a thousandth of the mean if not given

@@ -15,13 +15,13 @@ use std::path::PathBuf;
 /// Third-party formats.
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
 enum Format {
-    /// Folder of EXR with every bit
+    /// Folder of EXR, lossless
     Exr,
     /// Folder of PNG: 16-bit sRGB, values above 1 clipped
     Png,
     /// Zip archive of JPEG, named as those of UBO2003
     Ubo2003,
-    /// Full-matrix factorisation of Bonn, FMF06FC
+    /// Full-matrix factorisation in a .btf (Bonn, FMF06FC)
     Btf,
 }
 
@@ -41,10 +41,10 @@ pub struct Arguments {
     /// Quality of a JPEG, 1 to 100; 95 if not given
     #[arg(long, value_parser = clap::value_parser!(u8).range(1..=100))]
     quality: Option<u8>,
-    /// Scale of the values in a JPEG; 1 if not given
+    /// Scale of the values of a JPEG; 1 if not given
     #[arg(long, value_parser = parse::exposure)]
     exposure: Option<f32>,
-    /// External dictionary of a file
+    /// External dictionary of the source, if that is a file
     #[arg(long)]
     dictionary: Option<PathBuf>,
     #[command(flatten)]

@@ -17,10 +17,10 @@ use std::path::{Path, PathBuf};
 /// Options of the command.
 #[derive(Args)]
 pub struct Arguments {
-    /// Data, detected by content: a .btf of Bonn (UBO2014); a zip (UBO2003, ATRIUM) or a folder (UTIA) with
-    /// images named tlTTT plPPP tvTTT pvPPP (.exr, .png, .jpg, .hdr), or a folder with a dataset.json that
-    /// lists them; or a folder with Coeffs_BTF_NAME_1e-05_{Y,U,V}.bin, DictEnsOrth4D*.bin,
-    /// NAME_mean_std.bin and xyz_loc.bin
+    /// Data, detected by content: a .btf of Bonn (UBO2014); a zip (UBO2003, ATRIUM) or a folder (UTIA) of
+    /// images (.exr, .png, .jpg, .hdr) named tlTTT plPPP tvTTT pvPPP by polar angle and azimuth of light and
+    /// view in degrees, or listed by a dataset.json; or SparseBTF, a folder with
+    /// Coeffs_BTF_NAME_1e-05_{Y,U,V}.bin, DictEnsOrth4D*.bin, NAME_mean_std.bin and xyz_loc.bin
     source: PathBuf,
     /// SparseBTF: the material, if the folder has several
     #[arg(long)]
@@ -53,17 +53,17 @@ enum Cosine {
 /// Options of a source that becomes a dataset.
 #[derive(Args)]
 pub struct DataArgs {
-    /// Keep 32-bit floats instead of binary16
+    /// Store 32-bit floats instead of binary16
     #[arg(long)]
     float: bool,
-    /// Whether values contain the cosine of the light's angle; if not given, as the data state it, otherwise
-    /// included
+    /// Whether values contain the cosine of the light's polar angle; as the data state it if not given, and
+    /// included if they do not
     #[arg(long, value_enum)]
     cosine: Option<Cosine>,
     /// Name of the material; that of the file or folder if not given
     #[arg(long)]
     name: Option<String>,
-    /// Where the data are from
+    /// Origin of the data
     #[arg(long, default_value = "")]
     origin: String,
     /// Licence of the data
@@ -74,7 +74,7 @@ pub struct DataArgs {
     colours: Option<Colours>,
     /// Memory budget for images held at once, MB; a larger single image is refused
     ///
-    /// 1000 if not given; more memory writes longer runs
+    /// 1000 if not given; a larger budget writes longer runs to disk
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     memory: Option<u32>,
     /// Write the height map of a .btf to an .exr, values unchanged

@@ -14,7 +14,7 @@ use std::path::Path;
 pub struct Arguments {
     #[command(flatten)]
     source: FileArgs,
-    /// As JSON
+    /// Print as JSON
     #[arg(long)]
     json: bool,
 }

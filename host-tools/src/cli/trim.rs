@@ -43,7 +43,7 @@ pub struct Arguments {
     /// Keep lights within this angle from the normal, and optionally between two azimuths: 60 or 60,350,10
     #[arg(long, value_parser = parse_sector)]
     lights: Option<Sector>,
-    /// Keep views, likewise
+    /// Keep views, as --lights
     #[arg(long, value_parser = parse_sector)]
     views: Option<Sector>,
     /// Allow re-triangulation (changes interpolated results)

@@ -1,4 +1,4 @@
-//! Materials in the formats of others: what a path holds, by its content, and a dataset of it.
+//! Materials in third-party formats: what a path holds, by its content, and a dataset of it.
 //!
 //! | module | does |
 //! |---|---|
@@ -88,7 +88,7 @@ impl ImportOptions {
     }
 }
 
-/// A text of others as a file may have it (3.4-3): without what is not seen, and not long.
+/// A third-party text as a file may have it (3.4-3): without invisible characters, at most 200 characters.
 pub fn clean(text: &str) -> String {
     text.chars()
         .filter(|&c| !selvedge::container::metadata::is_invisible(c))
@@ -141,7 +141,7 @@ impl std::fmt::Display for Kind {
     }
 }
 
-/// Says what a path holds, by its content and not by its name.
+/// What a path holds, by its content and not by its name.
 ///
 /// # Errors
 /// If it is none of the kinds, and on I/O.
@@ -169,7 +169,7 @@ pub fn detect(path: &Path) -> Result<Kind> {
     }
 }
 
-/// Makes a dataset of a `.btf`, batch by batch of texels; `progress` hears how many of how many texels are
+/// Makes a dataset of a `.btf`, batch by batch of texels; `progress` gets how many of how many texels are
 /// done.
 ///
 /// # Errors
@@ -291,7 +291,7 @@ fn known_grid(set: &[DVec3]) -> Vec<DVec3> {
     directions::grid(set.len()).filter(is_grid).unwrap_or_else(|| set.to_vec())
 }
 
-/// What a path of others holds, for `info`.
+/// What a path with third-party data holds, for `info`.
 #[derive(Debug, Serialize)]
 pub struct ForeignInfo {
     /// Which kind it is.
@@ -378,7 +378,7 @@ impl ForeignInfo {
     }
 }
 
-/// Says what a path of others holds; of a set of images, the first alone is looked into.
+/// Describes what a path with third-party data holds; of a set of images, only the first is opened.
 ///
 /// # Errors
 /// If it is not as its format says, and on I/O.

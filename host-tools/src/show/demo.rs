@@ -10,7 +10,7 @@ use crate::error::{Result, ToolError};
 use crate::files;
 use crate::format::bits::hex;
 use selvedge::{Limits, Selvedge};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Runs the demo into a folder; `log` takes each line of progress.
 ///
@@ -20,8 +20,8 @@ pub fn run(out: &Path, log: &mut dyn FnMut(String)) -> Result<()> {
     std::fs::create_dir_all(out).map_err(ToolError::io(out))?;
     let modelled = pipeline::run(out, log)?;
     let imported = excerpt::import(out, log)?;
-    let files = imported.iter().map(|m| (&m.path, m.bytes.as_slice()));
-    let files = files.chain(modelled.written.iter().map(|(path, bytes)| (path, bytes.as_slice())));
+    let files = imported.iter().map(|m| (m.path.as_path(), m.bytes.as_slice()));
+    let files = files.chain(modelled.written.iter().map(|(path, bytes)| (path.as_path(), bytes.as_slice())));
     let materials = files.map(|(path, bytes)| checked(path, bytes, log)).collect::<Result<Vec<_>>>()?;
     let gpu_line = compare_with_gpu(&materials, log)?;
 
@@ -39,11 +39,11 @@ pub fn run(out: &Path, log: &mut dyn FnMut(String)) -> Result<()> {
 }
 
 /// A file that was written, validated and opened.
-fn checked<'a>(path: &PathBuf, bytes: &'a [u8], log: &mut dyn FnMut(String)) -> Result<Selvedge<'a>> {
+fn checked<'a>(path: &Path, bytes: &'a [u8], log: &mut dyn FnMut(String)) -> Result<Selvedge<'a>> {
     let name = path.display().to_string();
     let report = validate::validate(&name, bytes, None, &validate::Options::default());
     let opened = selvedge::open(bytes, &Limits::default())
-        .map_err(|finding| ToolError::Invalid { path: path.clone(), finding })?;
+        .map_err(|finding| ToolError::Invalid { path: path.to_owned(), finding })?;
     let digest = hex(&opened.decode_digest());
     log(format!("{name}: {} findings, decode digest {}", report.count(), &digest[..16]));
     Ok(opened)

@@ -20,7 +20,7 @@ macro_rules! excerpt {
 }
 
 /// The excerpt, in the authors' layout, with its licence.
-pub const EXCERPT: &[(&str, &[u8])] = excerpt![
+const EXCERPT: &[(&str, &[u8])] = excerpt![
     "Coeffs_BTF_carpet07_1e-05_U.bin",
     "Coeffs_BTF_carpet07_1e-05_V.bin",
     "Coeffs_BTF_felt05_1e-05_U.bin",

@@ -2,7 +2,7 @@
 
 pub mod ball;
 #[cfg(all(feature = "cli", feature = "import"))]
-pub mod demo;
+pub(crate) mod demo;
 #[cfg(all(feature = "cli", feature = "import"))]
 pub mod excerpt;
 #[cfg(all(feature = "cli", feature = "import"))]

@@ -5,10 +5,10 @@
 //!
 //! | module | does |
 //! |---|---|
-//! | [`solids`], [`yarns`] | the geometry, from a seed |
-//! | [`mesh`], [`noise`] | height fields and swept tubes; periodic variation |
-//! | [`trace`], [`shadow`], [`radiosity`] | what is seen, lit, and bounced |
-//! | [`shade`], [`preview`](mod@preview) | radiance; pictures for documentation |
+//! | `solids`, `yarns` | the geometry, from a seed |
+//! | `mesh`, `noise` | height fields and swept tubes; periodic variation |
+//! | `trace`, `shadow`, `radiosity` | what is seen, lit, and bounced |
+//! | `shade`, [`preview`](mod@preview) | radiance; pictures for documentation |
 //!
 //! A tile is the unit square and less than 0.09 high. A texel is a square of the plane halfway up; a viewer
 //! sees it where rays through the stratified points of that square meet the surface. Texel rows ascend with y
@@ -18,15 +18,15 @@
 //! What is left out: specular light between surfaces, light through yarns, and hairs. Highlights are those of
 //! the rays of a texel, without a filter over its area; more rays make textures finer than a texel calmer.
 
-pub mod mesh;
-pub mod noise;
+mod mesh;
+mod noise;
 pub mod preview;
-pub mod radiosity;
-pub mod shade;
-pub mod shadow;
-pub mod solids;
-pub mod trace;
-pub mod yarns;
+mod radiosity;
+mod shade;
+mod shadow;
+mod solids;
+mod trace;
+mod yarns;
 
 pub use preview::preview;
 

@@ -250,7 +250,7 @@ fn folder_files(folder: &Path, all: &mut Vec<PathBuf>) -> Result<()> {
     Ok(())
 }
 
-/// Checks files on all cores; `each` is told of them in order.
+/// Checks files on all cores; `each` gets their reports in order.
 ///
 /// # Errors
 /// Those of `each`.

@@ -20,7 +20,7 @@
 //! * **Channels.** Three are R, G and B by their names; others are spectral and refused. A single one is
 //!   grey.
 //! * **Rotations** are a frame for each texel, or none. Values stay in the frames they have, as in both
-//!   readers; frames that are not the identity are told.
+//!   readers; frames that are not the identity are reported.
 //! * **Negative values**, which factorisations of dark materials have, become zero and are counted.
 //!
 //! No size is trusted: every table is known to be inside the file before anything is held for it. The side of

@@ -76,7 +76,7 @@ impl ImageSet {
         &self.description
     }
 
-    /// Makes a dataset; `progress` hears how many of how many images are done.
+    /// Makes a dataset; `progress` gets how many of how many images are done.
     ///
     /// # Errors
     /// If an image is damaged, not of the first one's size, or has a number that is no radiance, with the
@@ -157,7 +157,7 @@ impl ImageSet {
     }
 }
 
-/// Makes a dataset of a folder or an archive of images; `progress` hears how many of how many images are
+/// Makes a dataset of a folder or an archive of images; `progress` gets how many of how many images are
 /// done.
 ///
 /// # Errors

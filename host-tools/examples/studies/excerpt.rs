@@ -1,6 +1,6 @@
 //! Cuts the excerpt of the authors' data that the repository holds from their full files.
 //!
-//!     SELVEDGE_DATA=... cargo run -p selvedge-tools --example excerpt -- tests/data/sparsebtf
+//!     SELVEDGE_DATA=... cargo run -p selvedge-tools --example excerpt -- host-tools/data/sparsebtf
 //!
 //! Blocks and dictionaries are the authors' bytes, unchanged; only the dictionaries that the chosen
 //! blocks use are kept, and numbered anew.
