@@ -14,11 +14,11 @@ use selvedge_tools::data::dataset::{Dataset, Sample};
 use selvedge_tools::encode::goal::Target;
 use selvedge_tools::format::model::MaterialModel;
 use selvedge_tools::math::random::Random;
-use selvedge_tools::measure::baseline::pca::{Domain, pca};
 use selvedge_tools::methods::sparse_tensor::encode::fit::{Shape, Training};
 use selvedge_tools::methods::sparse_tensor::encode::{Options, encode};
 use selvedge_tools::methods::sparse_tensor::model::tensor_of;
 use selvedge_tools::synth::{Mesostructure, Request, synthesise};
+use selvedge_tools::{data::transfer::Domain, math::pca::pca};
 use std::hint::black_box;
 use std::time::Instant;
 

@@ -15,6 +15,7 @@
 //! | [`show`] | pictures of balls; the demo | `cli` and `import` for the demo |
 //! | [`math`] | matrices, decompositions, random numbers | |
 //! | `cli` | the program | `cli` |
+//! | [`work`] | parallel work, added up in order | |
 //! | [`files`], [`error`], [`progress`] | whole writes, exit codes, progress on a terminal | |
 //!
 //! All features are on by default. A trainer or a binding for another language takes the library with
@@ -40,3 +41,4 @@ pub mod progress;
 pub mod report;
 pub mod show;
 pub mod synth;
+pub mod work;

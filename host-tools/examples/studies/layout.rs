@@ -10,9 +10,10 @@ use selvedge::method::sparse_ensemble::check;
 use selvedge::method::sparse_ensemble::check::LOW_BITS_LIMIT;
 use selvedge::method::sparse_ensemble::{LOW_BITS_BITS, SHIFT_BITS};
 use selvedge_tools::data::dataset::Dataset;
+use selvedge_tools::data::transfer::Domain;
 use selvedge_tools::error::{Result, ToolError};
 use selvedge_tools::format::model::TransferModel;
-use selvedge_tools::measure::baseline::pca::{self, Choice};
+use selvedge_tools::measure::baseline::pca::{Choice, components};
 use selvedge_tools::measure::baseline::published::Published;
 use selvedge_tools::measure::compare::{Metrics, Source, compare};
 use selvedge_tools::methods::sparse_ensemble::encode::{Criterion, Encoded, Options, encode, prepare};
@@ -194,7 +195,7 @@ fn run(path: &Path, ratios: &[u64]) -> Result<()> {
     let ensembles = data.own_ensembles()?;
     let mut layout = data.layout(&ensembles, budgets.iter().max().copied().unwrap_or(whole) * REACH)?;
     eprintln!("the published layout is projected");
-    let mut components = pca::pca(&dataset, pca::Domain::Log, RANK)?;
+    let mut components = components(&dataset, Domain::Log, RANK)?;
     eprintln!("{} components are found", components.rank());
 
     println!("\n### Equal bytes\n");

@@ -8,9 +8,10 @@
 
 use selvedge::Limits;
 use selvedge_tools::data::dataset::Dataset;
+use selvedge_tools::data::transfer::Domain;
 use selvedge_tools::encode::goal::Target;
 use selvedge_tools::error::{Result, ToolError};
-use selvedge_tools::measure::baseline::pca::{Domain, pca};
+use selvedge_tools::measure::baseline::pca;
 use selvedge_tools::measure::compare::{Source, compare};
 use selvedge_tools::methods::sparse_tensor::encode::fit::{Shape, Training, fit};
 use selvedge_tools::methods::sparse_tensor::encode::{Options, encode_fit};
@@ -29,7 +30,7 @@ fn main() -> Result<()> {
         |text: &str| text.parse::<usize>().map_err(|_| ToolError::Usage(format!("`{text}` is no number")));
     let data = Dataset::open(Path::new(path))?;
     let start = Instant::now();
-    let mut components = pca(&data, domain, number(rank)?)?;
+    let mut components = pca::components(&data, domain, number(rank)?)?;
     println!(
         "components: rank {}, {:.1} s; error of the means {:.5}, of all components {:.5}",
         components.rank(),

@@ -2,8 +2,8 @@
 
 use super::encoder::{Attempts, Common, Encoded, Encoder, Levels};
 use super::goal::{Goal, rms_of};
+use crate::data::transfer::Domain;
 use crate::error::{Result, ToolError};
-use crate::measure::baseline::pca::Domain;
 use crate::progress::Observer;
 
 /// What the best of several files is.

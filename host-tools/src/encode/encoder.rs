@@ -2,8 +2,8 @@
 
 use super::goal::{Goal, domain_name};
 use crate::data::dataset::Dataset;
+use crate::data::transfer::Domain;
 use crate::error::{Result, ToolError};
-use crate::measure::baseline::pca::Domain;
 use crate::measure::compare::Metrics;
 use crate::progress::Observer;
 use serde::ser::{Serialize, SerializeMap as _, Serializer};

@@ -21,8 +21,8 @@ use crate::data::dataset::{Dataset, Description, Sample, Statistics, Writer, fir
 use crate::data::directions;
 use crate::error::{Result, ToolError};
 use crate::format::container::is_dictionary;
-use crate::math::linear::ordered;
 use crate::methods::sparse_ensemble::sparsebtf;
+use crate::work::ordered;
 use btf::Btf;
 use glam::DVec3;
 use images::ImageSet;

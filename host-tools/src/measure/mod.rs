@@ -4,3 +4,4 @@ pub mod baseline;
 pub mod compare;
 pub mod similarity;
 pub mod speed;
+pub mod verify;

@@ -8,9 +8,10 @@
 use super::SIGNATURES;
 use crate::data::dataset::{Dataset, Description};
 use crate::data::directions::to_degrees;
+use crate::data::transfer::Domain;
 use crate::error::{Result, ToolError};
 use crate::files;
-use crate::measure::baseline::pca::{Domain, pca};
+use crate::math::pca::pca;
 use glam::DVec3;
 use std::path::Path;
 

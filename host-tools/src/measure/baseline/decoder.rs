@@ -4,8 +4,9 @@
 //! file. A filtered sample is between four texels, three lights and three views, and each decoder takes it in
 //! the order that costs least for its own layout.
 
-use super::pca::{Domain, Pca};
+use crate::data::transfer::Domain;
 use crate::math::linear::product_bt;
+use crate::math::pca::Pca;
 use crate::measure::compare::vector;
 use selvedge::kernel::position::axis_at_position;
 use selvedge::{Direction, FilteredQuery, Selvedge, Taps};
@@ -197,6 +198,11 @@ pub trait Decoder: Sync + Send {
 /// libraries have, and its scaling.
 pub const EXPONENTIAL: u64 = 7;
 
+/// Multiplications of [`Domain::back`] for three channels.
+pub(crate) fn inverse_operations(domain: Domain) -> u64 {
+    if domain == Domain::Log { 3 * EXPONENTIAL } else { 0 }
+}
+
 /// Multiplications of a sample's position and weights of directions, which files and baselines share; the
 /// rest of finding directions is compared apart.
 pub const POSITION: u64 = 18;
@@ -290,7 +296,7 @@ mod tests {
     use super::*;
     use crate::format::model::TransferModel;
     use crate::math::random::Random;
-    use crate::measure::baseline::pca::{self, Domain};
+    use crate::measure::baseline::pca::components;
     use crate::measure::baseline::{clusters, data, published, tests::small, tucker};
     use crate::measure::compare::{Source, compare};
     use crate::methods::sparse_ensemble::encode::{Criterion, Options, encode, prepare};
@@ -317,7 +323,7 @@ mod tests {
         };
 
         for domain in [Domain::Linear, Domain::Log] {
-            let mut components = pca::pca(&dataset, domain, 12).expect("made");
+            let mut components = components(&dataset, domain, 12).expect("made");
             let of_three = components.measure(3, 8).expect("measured");
             let clustered = clusters::clusters(&components, 3, 2);
             let decomposed = tucker::tucker(&components, 4, 9).expect("made");

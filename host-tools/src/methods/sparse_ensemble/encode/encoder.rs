@@ -6,15 +6,14 @@ use super::options::{Criterion, Encoded, Options};
 use super::prepare::prepare;
 use super::verified::{self, encode_edge};
 use crate::data::dataset::{Dataset, Description};
+use crate::data::transfer::{Domain, transfer_of};
 use crate::encode::encoder::{self, Attempts, Common, Encoder, Levels, Settings};
 use crate::encode::goal::{Goal, Verified};
 use crate::error::{Result, ToolError};
 use crate::format::model::TransferModel;
-use crate::measure::baseline::pca::Domain;
 use crate::methods::sparse_ensemble::dictionary::Ensemble;
 use crate::methods::sparse_ensemble::dictionary_file::DictionaryFile;
 use crate::methods::sparse_ensemble::train;
-use crate::methods::sparse_tensor::encode::transfer_of;
 use crate::progress::Observer;
 #[cfg(feature = "cli")]
 use clap::{ArgMatches, Args as _, Command, FromArgMatches as _};

@@ -7,10 +7,11 @@ use super::fit::{Fit, Shape, Training, fit};
 use super::options::{Encoded, Options};
 use super::shapes::ShapeSearch;
 use crate::data::dataset::Dataset;
+use crate::data::transfer::Domain;
 use crate::encode::encoder::{self, Attempts, Common, Encoder, Levels, Settings};
 use crate::encode::goal::{Goal, Steering, Task, Verified, domain_name, meet};
 use crate::error::{Result, ToolError};
-use crate::measure::baseline::pca::{Domain, Pca, pca_within};
+use crate::math::pca::{Pca, pca_within};
 use crate::progress::Observer;
 #[cfg(feature = "cli")]
 use clap::{ArgMatches, Args as _, Command, FromArgMatches as _};

@@ -17,8 +17,9 @@ pub mod options;
 mod ranges;
 pub mod shapes;
 
+pub use crate::data::transfer::transfer_of;
 pub use coder::{encode, encode_fit};
-pub use options::{Encoded, Options, transfer_of};
+pub use options::{Encoded, Options};
 pub use shapes::ShapeSearch;
 
 /// The encoder with default options.
@@ -29,8 +30,9 @@ mod tests {
     use super::fit::{Shape, Training};
     use super::{Options, encode};
     use crate::data::dataset::{Dataset, Description, Sample};
+    use crate::data::transfer::Domain;
     use crate::encode::goal::Target;
-    use crate::measure::baseline::pca::{Domain, pca};
+    use crate::math::pca::pca;
     use crate::measure::baseline::tests::small;
     use crate::measure::compare::{Source, compare};
     use selvedge::Limits;

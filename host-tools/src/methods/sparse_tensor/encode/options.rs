@@ -1,10 +1,8 @@
 //! How to encode, and what comes out.
 
 use super::fit::{Shape, Trained, Training};
-use crate::data::dataset::Dataset;
 use crate::encode::goal::Target;
-use crate::format::model::{MaterialModel, TransferModel};
-use crate::measure::baseline::pca::Domain;
+use crate::format::model::MaterialModel;
 
 /// How to encode.
 #[derive(Clone, Copy, Debug)]
@@ -80,17 +78,5 @@ impl Encoded {
             || self.trained.breakdowns > 0
             || self.trained.condition > STIFF
             || is_clipping_frequent(self.clipped, self.coefficients)
-    }
-}
-
-/// The transfer and offset that a domain is coded with.
-pub fn transfer_of(data: &Dataset, domain: Domain) -> TransferModel {
-    let statistics = data.statistics();
-    match domain {
-        Domain::Log => TransferModel::Log2 { offset: statistics.coded_offset() },
-        // Values below 16, so that a texture is far below its bound.
-        Domain::Linear => TransferModel::Linear {
-            exponent: (statistics.largest.max(1e-30).log2().ceil() as i32 - 4).clamp(-60, 60),
-        },
     }
 }
