@@ -198,6 +198,31 @@ const FLAT: &str = "
 }
 ";
 
+/// Terms, tables and the queries' rows on the device.
+fn inputs(device: &wgpu::Device, case: &Case, queries: &[Query]) -> [wgpu::Buffer; 3] {
+    let terms: Vec<i32> = case
+        .terms
+        .iter()
+        .flat_map(|t| {
+            [(t.x | t.y << 5 | t.light << 10 | t.view << 15) as i32, t.short, t.long, t.shift as i32]
+        })
+        .collect();
+    let starts: Vec<usize> =
+        case.tables.iter().scan(0, |at, t| Some(std::mem::replace(at, *at + t.len()))).collect();
+    let words: Vec<u32> =
+        queries.iter().flat_map(|q| (0..4).map(|i| (starts[i] + q[i] * COLUMNS) as u32)).collect();
+    let tables: Vec<i32> = case.tables.concat();
+    let make = |contents: &[u8]| {
+        let usage = wgpu::BufferUsages::STORAGE;
+        device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: None, contents, usage })
+    };
+    [
+        make(bytemuck::cast_slice(&terms)),
+        make(bytemuck::cast_slice(&tables)),
+        make(bytemuck::cast_slice(&words)),
+    ]
+}
+
 /// Seconds that a kernel takes for the queries, and its answers.
 fn on_gpu(
     device: &wgpu::Device,
@@ -224,34 +249,14 @@ fn on_gpu(
         cache: None,
     };
     let pipeline = device.create_compute_pipeline(&descriptor);
-    let terms: Vec<i32> = case
-        .terms
-        .iter()
-        .flat_map(|t| {
-            [(t.x | t.y << 5 | t.light << 10 | t.view << 15) as i32, t.short, t.long, t.shift as i32]
-        })
-        .collect();
-    let starts: Vec<usize> =
-        case.tables.iter().scan(0, |at, t| Some(std::mem::replace(at, *at + t.len()))).collect();
-    let words: Vec<u32> =
-        queries.iter().flat_map(|q| (0..4).map(|i| (starts[i] + q[i] * COLUMNS) as u32)).collect();
-    let tables: Vec<i32> = case.tables.concat();
-    let make = |contents: &[u8]| {
-        let usage = wgpu::BufferUsages::STORAGE;
-        device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: None, contents, usage })
-    };
+    let [terms, tables, words] = inputs(device, case, queries);
     let size = (queries.len() * 4) as u64;
     let buffer = |usage| {
         device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false })
     };
     let answers = buffer(wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
     let back = buffer(wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ);
-    let inputs = [
-        make(bytemuck::cast_slice(&terms)),
-        make(bytemuck::cast_slice(&tables)),
-        make(bytemuck::cast_slice(&words)),
-        answers.clone(),
-    ];
+    let inputs = [terms, tables, words, answers.clone()];
     let entries: Vec<wgpu::BindGroupEntry<'_>> = (0u32..)
         .zip(&inputs)
         .map(|(binding, b)| wgpu::BindGroupEntry { binding, resource: b.as_entire_binding() })

@@ -4,7 +4,7 @@
 //!
 //! With `SELVEDGE_DATA` the full 400 x 400 material is measured, without it the excerpt in the repository.
 
-use selvedge::{Direction, FilteredQuery, Limits, Rgb};
+use selvedge::{Direction, FilteredQuery, Limits, Rgb, Selvedge};
 use selvedge_tools::data::dataset::{Dataset, Sample};
 use selvedge_tools::format::model::{MaterialModel, TransferModel};
 use selvedge_tools::format::write;
@@ -166,9 +166,16 @@ fn main() {
     );
 
     let queries = queries(7);
+    of_samples(&material, &queries);
+    of_images(&material, queries[0].light, queries[0].view);
+    of_open(authors.to_model(10).expect("model"));
+}
+
+/// Filtered samples, one by one and in batches, and directions alone.
+fn of_samples(material: &Selvedge<'_>, queries: &[FilteredQuery]) {
     let mut scratch = vec![0; material.batch_scratch_len(queries.len())];
     let mut out = vec![Rgb::default(); queries.len()];
-    material.sample_batch(&queries, &mut scratch, &mut out).expect("buffers fit");
+    material.sample_batch(queries, &mut scratch, &mut out).expect("buffers fit");
     let plain = |query: &FilteredQuery| material.filtered(query.u_q32, query.v_q32, query.light, query.view);
     for (query, rgb) in queries.iter().zip(&out) {
         assert_eq!(plain(query), *rgb, "the batch is not the plain path");
@@ -196,17 +203,19 @@ fn main() {
     println!(
         "two directions located                         {}",
         rate(count, || {
-            for query in &queries {
+            for query in queries {
                 black_box((material.locate_light(query.light), material.locate_view(query.view)));
             }
         })
     );
+}
 
+/// Whole images of a channel, and of radiance.
+fn of_images(material: &Selvedge<'_>, light: Direction, view: Direction) {
     let [width, height] = material.image_size(0);
     let texels = (width * height) as usize;
     let mut scratch = vec![0; material.image_scratch_len()];
     let mut values = vec![0; texels];
-    let (light, view) = (queries[0].light, queries[0].view);
     let taps = (material.locate_light(light), material.locate_view(view));
     for channel in [1, 2] {
         material.decode_channel(channel, 0, light, view, &mut scratch, &mut values).expect("buffers fit");
@@ -242,9 +251,10 @@ fn main() {
             black_box(&image);
         })
     );
+}
 
-    // A file of about 5 MB: the same records over a taller image.
-    let mut model = authors.to_model(10).expect("model");
+/// Opens a file of about 5 MB: the same records over a taller image.
+fn of_open(mut model: MaterialModel) {
     let repeat = (5_000_000 / 400_000).min(16_000 / model.size[1]);
     model.size[1] *= repeat;
     for ensemble in ensembles_mut(&mut model) {

@@ -9,7 +9,7 @@
 
 use selvedge::kernel::position::{Place, axis_at_position};
 use selvedge::method::sparse_tensor::sparse_tensor_textures_q20;
-use selvedge::{Direction, FilteredQuery, Limits, Located, Rgb, Taps};
+use selvedge::{Direction, FilteredQuery, Limits, Located, Rgb, Selvedge, Taps};
 use selvedge_tools::data::dataset::{Dataset, Sample};
 use selvedge_tools::encode::goal::Target;
 use selvedge_tools::format::model::MaterialModel;
@@ -205,6 +205,18 @@ fn measure(data: &Dataset, light_atoms: usize, abrdf_atoms: usize) {
     );
     assert!(worst < 1e-3 * largest, "{worst} of {largest}");
 
+    timings(&material, &floats, &queries, &located);
+}
+
+/// Times the batch, the plain path and separate taps, in turns.
+fn timings(
+    material: &Selvedge<'_>,
+    floats: &Floats,
+    queries: &[FilteredQuery],
+    located: &[(Located, Located)],
+) {
+    let mut scratch = vec![0; material.batch_scratch_len(queries.len())];
+    let mut out = vec![Rgb::default(); queries.len()];
     let mut rates = [(); 3].map(|()| Vec::new());
     for _ in 0..RUNS {
         let mut timed = |which: usize, run: &mut dyn FnMut()| {
@@ -212,7 +224,7 @@ fn measure(data: &Dataset, light_atoms: usize, abrdf_atoms: usize) {
             run();
             rates[which].push(queries.len() as f64 / begin.elapsed().as_secs_f64());
         };
-        timed(0, &mut || material.sample_batch(&queries, &mut scratch, &mut out).expect("buffers fit"));
+        timed(0, &mut || material.sample_batch(queries, &mut scratch, &mut out).expect("buffers fit"));
         black_box(&out);
         timed(1, &mut || {
             queries.iter().for_each(|q| _ = black_box(material.filtered(q.u_q32, q.v_q32, q.light, q.view)))
@@ -220,7 +232,7 @@ fn measure(data: &Dataset, light_atoms: usize, abrdf_atoms: usize) {
         timed(2, &mut || {
             queries
                 .iter()
-                .zip(&located)
+                .zip(located)
                 .for_each(|(q, &(light, view))| _ = black_box(floats.filtered(q, light.taps, view.taps)))
         });
     }
