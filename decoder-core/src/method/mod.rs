@@ -73,7 +73,7 @@ macro_rules! dispatch {
             pub(crate) fn batch_scratch_len(selvedge: &Selvedge<'_>, count: usize) -> usize {
                 match selvedge.material().method {
                     $(#[cfg(feature = $feature)]
-                    super::$module::$number => super::$module::fast::batch_scratch_len(selvedge, count),)*
+                    crate::method::$module::$number => crate::method::$module::fast::batch_scratch_len(selvedge, count),)*
                     _ => 0,
                 }
             }
@@ -87,7 +87,7 @@ macro_rules! dispatch {
             ) -> Option<()> {
                 match selvedge.material().method {
                     $(#[cfg(feature = $feature)]
-                    super::$module::$number => super::$module::fast::batch(selvedge, queries, scratch, out),)*
+                    crate::method::$module::$number => crate::method::$module::fast::batch(selvedge, queries, scratch, out),)*
                     _ => Some(()),
                 }
             }
@@ -96,7 +96,7 @@ macro_rules! dispatch {
             pub(crate) fn image_scratch_len(selvedge: &Selvedge<'_>) -> usize {
                 match selvedge.material().method {
                     $(#[cfg(feature = $feature)]
-                    super::$module::$number => super::$module::fast::image_scratch_len(selvedge),)*
+                    crate::method::$module::$number => crate::method::$module::fast::image_scratch_len(selvedge),)*
                     _ => 0,
                 }
             }
@@ -110,7 +110,7 @@ macro_rules! dispatch {
             ) {
                 match selvedge.material().method {
                     $(#[cfg(feature = $feature)]
-                    super::$module::$number => super::$module::fast::image(selvedge, query, scratch, textures),)*
+                    crate::method::$module::$number => crate::method::$module::fast::image(selvedge, query, scratch, textures),)*
                     _ => {}
                 }
             }

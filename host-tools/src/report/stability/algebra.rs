@@ -3,10 +3,10 @@
 use super::files::dataset;
 use super::{Case, Outcome, case};
 use crate::data::directions;
+use crate::data::transfer::Domain;
 use crate::error::{Result, ToolError};
 use crate::math::linear::{eigenbasis, nearest_orthogonal, orthonormal, product_at};
 use crate::math::random::Random;
-use crate::data::transfer::Domain;
 use crate::measure::baseline::pca;
 use std::path::Path;
 

@@ -2,10 +2,10 @@
 
 use super::swept::{Curve, Made, Shared, Swept, Visitor, What};
 use crate::data::dataset::Dataset;
+use crate::data::transfer::Domain;
 use crate::encode::goal::domain_name;
 use crate::error::Result;
 use crate::measure::baseline::data::Uncompressed as Values;
-use crate::data::transfer::Domain;
 use crate::measure::baseline::pca::Components;
 use crate::measure::baseline::{clusters, published, tucker};
 use std::time::Instant;
