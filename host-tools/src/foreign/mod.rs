@@ -38,8 +38,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 pub struct ImportOptions {
     /// How values are stored.
     pub sample: Sample,
-    /// Whether values contain the cosine of the light's angle; if it is not said, as the data say, and if
-    /// they do not, yes.
+    /// Whether values contain the cosine of the light's angle; if `None`, as the data state it, and if they
+    /// do not, yes.
     pub cosine_included: Option<bool>,
     /// Name of the material; if empty, that of the data.
     pub name: String,
@@ -76,7 +76,7 @@ impl ImportOptions {
         format!("{value} is not a radiance from 0 to {:e}{hint}", self.sample.largest())
     }
 
-    /// A description of data, completed by what the user says.
+    /// A description of data, completed by the user's options.
     fn describe(&self, found: &Description) -> Description {
         let asked = [&self.name, &self.origin, &self.licence];
         let texts =
@@ -310,7 +310,7 @@ pub struct ForeignInfo {
     pub size: [usize; 2],
     /// Light and view directions.
     pub directions: [usize; 2],
-    /// The light's cosine is in the values, as the data say or as is usual.
+    /// The light's cosine is in the values, as the data state or by default.
     pub cosine_included: bool,
     /// Width and height of a texel in nanometres, 0 if unknown.
     pub texel_nm: [u32; 2],
@@ -320,7 +320,7 @@ pub struct ForeignInfo {
     pub dataset_bytes: u64,
     /// Mean, least and largest value, where they are known without reading all.
     pub statistics: Option<Statistics>,
-    /// What stands in the head of a `.btf`.
+    /// The header of a `.btf`.
     pub btf: Option<btf::Head>,
 }
 

@@ -47,7 +47,7 @@ const OLD_VIEWS: u32 = 301_074;
 /// Most channels whose names are read.
 const MOST_CHANNELS: u32 = 4096;
 
-/// What stands before the values, and in a word what they are.
+/// The fields before the values, and the layout of the values in words.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Head {
     /// Which of the formats it is.
@@ -64,7 +64,7 @@ pub struct Head {
     pub pixels_per_mm: f32,
     /// Scale of the colours as the file states it; no known reader applies it.
     pub rgb_scale: [f32; 3],
-    /// Whether the values contain the cosine of the light's angle, if the file says.
+    /// Whether the values contain the cosine of the light's angle, if the file states it.
     pub cosine_included: Option<bool>,
     /// Names of the channels.
     pub channels: Vec<String>,
@@ -167,7 +167,7 @@ impl Btf {
         Ok(Btf { bytes, head, body, heights })
     }
 
-    /// What the file says of itself.
+    /// The header.
     pub fn head(&self) -> &Head {
         &self.head
     }

@@ -5,7 +5,7 @@ use crate::encode::encoder::{self, Common, Encoder, Levels};
 use crate::encode::goal::Goal;
 use crate::error::{Result, ToolError};
 use crate::math::random::Random;
-use crate::measure::baseline::pca::Domain;
+use crate::data::transfer::Domain;
 use crate::methods::sparse_ensemble::encode::encoder::SparseEnsemble;
 use crate::methods::sparse_tensor::encode::encoder::SparseTensor;
 use crate::methods::sparse_tensor::encode::fit::{Shape, Training};

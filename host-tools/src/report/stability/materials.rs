@@ -5,7 +5,7 @@ use super::{Case, Outcome, case};
 use crate::data::directions;
 use crate::encode::goal::{domain_name, rms_of};
 use crate::error::Result;
-use crate::measure::baseline::pca::Domain;
+use crate::data::transfer::Domain;
 use crate::measure::compare::{Source, compare};
 use crate::methods::{METHODS, Method};
 use std::path::Path;
