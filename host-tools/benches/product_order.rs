@@ -361,7 +361,8 @@ fn main() {
                 queries.len() as f64 / seconds / 1e6
             });
             println!(
-                "{count:4} coefficients  {name:7} {quality:6.1} dB  CPU, 8 lanes {:6.2} M sums/s  kernel {:6.2} M/s",
+                "{count:4} coefficients  {name:7} {quality:6.1} dB  CPU, 8 lanes {:6.2} M sums/s  \
+                 kernel {:6.2} M/s",
                 rate / 1e6,
                 gpu_rate.unwrap_or(f64::NAN)
             );

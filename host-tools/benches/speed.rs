@@ -94,7 +94,8 @@ fn mean_operations(model: &MaterialModel) -> [f64; 2] {
     [sample / blocks * (1.0 + 1.0 / edge).powi(2), image / blocks / channels / (edge * edge) + 2.0]
 }
 
-/// Filtered RGB samples of an encoded material whose samples meet `met` coefficients of each channel on average.
+/// Filtered RGB samples of an encoded material whose samples meet `met` coefficients of each channel on
+/// average.
 fn encoded(folder: &Path, met: [usize; 3]) {
     const EDGE: usize = 16;
     let path = folder.join("cloth.selvset");

@@ -30,8 +30,8 @@ impl<'a> Subject<'a> {
         }
     }
 
-    /// Errors against data, at every N-th light of each view. A PSNR is clamped to 999 dB, as equal images have no
-    /// finite one.
+    /// Errors against data, at every N-th light of each view. A PSNR is clamped to 999 dB, as equal
+    /// images have no finite one.
     ///
     /// # Errors
     /// If data cannot be read.

@@ -38,12 +38,12 @@ pub struct Request {
     pub held_out: bool,
     /// Methods whose names contain one of these; all if empty.
     pub methods: Vec<String>,
-    /// Errors are taken at every N-th light of each view, the first of them moving from view to view; chosen by
-    /// `COMPARED` if `None`.
+    /// Errors are taken at every N-th light of each view, the first of them moving from view to view; chosen
+    /// by the amount of data if `None`.
     pub every: Option<usize>,
 }
 
-/// Texels times pairs that a setting is compared at, about, if the caller does not say how many.
+/// Texels times pairs that a setting is compared at, about, if [`Request::every`] is not given.
 const COMPARED: usize = 9_000_000;
 
 impl Default for Request {

@@ -38,7 +38,10 @@ fn quoted(text: &str) -> String {
 /// The table as CSV.
 pub(super) fn to_csv(lines: &[Line]) -> String {
     let mut text = String::from(
-        "dataset,method,setting,kind,bytes,linear_rms,log_rms,psnr_db,peak,relative_l2,ssim,flip,largest,largest_x,largest_y,largest_light,largest_view,operations_mean,operations_largest,operations_stated,random_per_s,random_least,random_most,coherent_per_s,single_per_s,random_all_per_s,coherent_all_per_s,kernel_per_s,random_to_reference,encode_s,open_s,peak_memory\n",
+        "dataset,method,setting,kind,bytes,linear_rms,log_rms,psnr_db,peak,relative_l2,ssim,flip,largest,\
+        largest_x,largest_y,largest_light,largest_view,operations_mean,operations_largest,operations_stated,\
+        random_per_s,random_least,random_most,coherent_per_s,single_per_s,random_all_per_s,\
+        coherent_all_per_s,kernel_per_s,random_to_reference,encode_s,open_s,peak_memory\n",
     );
     let optional = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
     for l in lines {

@@ -68,7 +68,8 @@ pub(super) fn cases() -> Vec<Case> {
             "arithmetic",
             "logarithm undone, powers of two from 2^-10 to 2^30",
             "largest over smallest result",
-            "7.2: of the power of two: 2^-28 of the exponential, 2^-30 of the offset that is cut, half a unit of binary32",
+            "7.2: of the power of two: 2^-28 of the exponential, 2^-30 of the offset that is cut, half a \
+            unit of binary32",
             |_| {
                 // Offset 2^-10 as mantissa and exponent.
                 let (mantissa, exponent) = (0x8000_0000u32, -10);

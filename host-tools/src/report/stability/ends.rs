@@ -1,4 +1,5 @@
-//! Directions at their ends: triangulations of hard sets, the horizon, and continuity along the smallest steps.
+//! Directions at their ends: triangulations of hard sets, the horizon, and continuity along the smallest
+//! steps.
 
 use super::files::{direction, opened, small_file, upward, weight_defect};
 use super::weights::hard_sets;
@@ -35,7 +36,8 @@ pub(super) fn cases() -> Vec<Case> {
             "directions",
             "light and view below the horizon",
             "degrees below",
-            "5.7: weights stay whole, just below is where the horizon is, colours are finite and not negative",
+            "5.7: weights stay whole, just below is where the horizon is, colours are finite and not \
+            negative",
             |folder| {
                 let set = directions::grid(81).expect("known");
                 let bytes = small_file(folder, &set, &set, [4, 4], METHODS[0])?;
@@ -70,7 +72,8 @@ pub(super) fn cases() -> Vec<Case> {
                 "continuity",
                 format!("{}: {what} in the smallest steps", method.name),
                 "steps taken",
-                "a step changes a weight by 2^15 over the least height of a triangle and one rounding each; times the range of values, and eight roundings; of Q20",
+                "a step changes a weight by 2^15 over the least height of a triangle and one rounding each; \
+                times the range of values, and eight roundings; of Q20",
                 move |folder| continuity(folder, method, what),
             ));
         }

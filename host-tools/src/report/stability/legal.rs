@@ -40,7 +40,8 @@ pub(super) fn cases() -> Vec<Case> {
             "largest legal",
             "sparse tensor: sums of a texel of extreme files, in wide integers",
             "samples",
-            "12.5-8: weights and products of all ABRDF atoms of a sample sum below 2^31 before they are clamped",
+            "12.5-8: weights and products of all ABRDF atoms of a sample sum below 2^31 before they are \
+            clamped",
             |_| layer_sums(),
         ),
     ];

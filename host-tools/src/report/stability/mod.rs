@@ -1,9 +1,9 @@
 //! Numerical stability on stiff and extreme cases: a table of cases, each with a bound that is stated before
 //! anything is measured.
 //!
-//! A case says what makes it hard (its condition: a condition number, a dynamic range, or how extreme it is),
-//! where its bound comes from, and measures. Nothing is left out silently: a case that cannot be made is a
-//! failure. `selvedge report --stability` puts the table on a page.
+//! A case states its condition (a condition number, a dynamic range, or how extreme it is) and where its
+//! bound comes from, and measures. Nothing is left out silently: a case that cannot be made is a failure.
+//! `selvedge report --stability` puts the table on a page.
 
 mod algebra;
 mod arithmetic;

@@ -196,7 +196,7 @@ mod tests {
             let curve = entry.curves(Domain::Log).remove(0);
             assert_eq!((curve.name, curve.colour), (format!("{}, log", method.name), method.colour));
             let mut found = Vec::new();
-            let said = RefCell::new(Vec::new());
+            let logged = RefCell::new(Vec::new());
             let mut visitor = Visitor {
                 wanted: &|_, _| true,
                 visit: &mut |made: Made| {
@@ -205,14 +205,14 @@ mod tests {
                         Ok(())
                     })
                 },
-                log: &|line| said.borrow_mut().push(line.to_owned()),
+                log: &|line| logged.borrow_mut().push(line.to_owned()),
                 memory: &Memory::default(),
             };
             let budgets = [missed, met];
             let mut shared = Shared::new(&data, Domain::Log, 8, &budgets);
             entry.sweep(&mut shared, &mut visitor).expect("swept");
             assert!(found.len() == 1 && found[0].0 == met && found[0].1 <= met, "{found:?}");
-            assert!(said.borrow().iter().any(|line| line.contains("left out")), "{said:?}");
+            assert!(logged.borrow().iter().any(|line| line.contains("left out")), "{logged:?}");
         }
     }
 }
