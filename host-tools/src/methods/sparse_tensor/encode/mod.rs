@@ -23,7 +23,7 @@ pub use options::{Encoded, Options};
 pub use shapes::ShapeSearch;
 
 /// The encoder with default options.
-pub static ENCODER: encoder::SparseTensor = encoder::SparseTensor::DEFAULT;
+pub static ENCODER: options::SparseTensor = options::SparseTensor::DEFAULT;
 
 #[cfg(test)]
 mod tests {
