@@ -5,9 +5,9 @@
 //! the order that costs least for its own layout.
 
 use crate::data::transfer::Domain;
+use crate::format::query::vector;
 use crate::math::linear::product_bt;
 use crate::math::pca::Pca;
-use crate::measure::compare::vector;
 use selvedge::kernel::position::axis_at_position;
 use selvedge::{Direction, FilteredQuery, Selvedge, Taps};
 
@@ -298,7 +298,8 @@ mod tests {
     use crate::math::random::Random;
     use crate::measure::baseline::pca::components;
     use crate::measure::baseline::{clusters, data, published, tests::small, tucker};
-    use crate::measure::compare::{Source, compare};
+    use crate::measure::compare::compare;
+    use crate::measure::radiance::Baseline;
     use crate::methods::sparse_ensemble::encode::{Criterion, Options, encode, prepare};
     use selvedge::Limits;
 
@@ -343,9 +344,9 @@ mod tests {
             ];
             let mut random = Random::new(3);
             for (number, (decoder, row)) in all.iter().enumerate() {
-                let source = Source::Baseline(decoder.as_ref(), &locator);
+                let source = Baseline { decoder: decoder.as_ref(), locator: &locator };
                 let metrics = compare(
-                    Source::Data(&dataset),
+                    &dataset,
                     source,
                     description,
                     dataset.statistics().log_offset(),

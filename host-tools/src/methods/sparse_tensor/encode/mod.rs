@@ -34,7 +34,8 @@ mod tests {
     use crate::encode::goal::Target;
     use crate::math::pca::pca;
     use crate::measure::baseline::tests::small;
-    use crate::measure::compare::{Source, compare};
+    use crate::measure::compare::compare;
+    use crate::measure::radiance::AtLevel;
     use selvedge::Limits;
 
     fn options(target: Target) -> Options {
@@ -46,8 +47,8 @@ mod tests {
     fn decoded(data: &Dataset, bytes: &[u8], domain: Domain) -> f64 {
         let file = selvedge::open(bytes, &Limits::NONE).unwrap_or_else(|finding| panic!("{finding}"));
         let metrics = compare(
-            Source::Data(data),
-            Source::File(&file, 0),
+            data,
+            AtLevel { file: &file, level: 0 },
             data.description(),
             data.statistics().log_offset(),
             None,
