@@ -100,8 +100,8 @@ pub fn with_material<T>(
 pub fn warn_of_triangles(path: &Path, file: &Selvedge<'_>) {
     if !read::same_triangles(file) {
         eprintln!(
-            "warning: {}: its triangulation differs from the one that this tool computes; interpolated bits may \
-             change",
+            "warning: {}: its triangulation differs from the one that this tool computes; interpolated bits \
+             may change",
             path.display()
         );
     }

@@ -50,10 +50,12 @@ pub struct Arguments {
     picture: Option<PathBuf>,
     /// Light of the picture: angle from the normal and azimuth, degrees; snapped to the nearest direction of
     /// the reference
-    #[arg(long, default_value = "30,0", value_name = "POLAR,AZIMUTH", value_parser = parse::angles, allow_hyphen_values = true)]
+    #[arg(long, value_parser = parse::angles, allow_hyphen_values = true)]
+    #[arg(default_value = "30,0", value_name = "POLAR,AZIMUTH")]
     light: Direction,
     /// View of the picture
-    #[arg(long, default_value = "0,0", value_name = "POLAR,AZIMUTH", value_parser = parse::angles, allow_hyphen_values = true)]
+    #[arg(long, value_parser = parse::angles, allow_hyphen_values = true)]
+    #[arg(default_value = "0,0", value_name = "POLAR,AZIMUTH")]
     view: Direction,
     /// Error of ln(x + offset) that is white in the picture
     #[arg(long, default_value_t = 1.0, value_parser = positive)]

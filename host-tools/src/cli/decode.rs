@@ -17,10 +17,12 @@ pub struct Arguments {
     #[arg(short, long)]
     output: PathBuf,
     /// Light: angle from the normal and azimuth, degrees
-    #[arg(long, default_value = "30,0", value_name = "POLAR,AZIMUTH", value_parser = parse::angles, allow_hyphen_values = true)]
+    #[arg(long, value_parser = parse::angles, allow_hyphen_values = true)]
+    #[arg(default_value = "30,0", value_name = "POLAR,AZIMUTH")]
     light: Direction,
     /// View: angle from the normal and azimuth, degrees
-    #[arg(long, default_value = "0,0", value_name = "POLAR,AZIMUTH", value_parser = parse::angles, allow_hyphen_values = true)]
+    #[arg(long, value_parser = parse::angles, allow_hyphen_values = true)]
+    #[arg(default_value = "0,0", value_name = "POLAR,AZIMUTH")]
     view: Direction,
     /// Level of detail
     #[arg(long, default_value_t = 0)]

@@ -81,7 +81,8 @@ enum Command {
     Blend(blend::Arguments),
     /// Benchmark sampling of files: on one core and on all, random and coherent queries, the kernel
     Bench(bench::Arguments),
-    /// Measure error against run time of all methods and baselines on datasets: tables, plots, pictures, a page
+    /// Measure error against run time of all methods and baselines on datasets: tables, plots, pictures and a
+    /// page
     Report(report::Arguments),
     /// Describe a file, a dataset or third-party data
     Info(info::Arguments),

@@ -66,8 +66,8 @@ pub fn run(args: Arguments) -> Result<u8> {
     let model = with_material(&args.source, |file| {
         // 10.8-3: what is left has the results of the original.
         if !args.retriangulate && !read::same_triangles(&file) {
-            let why = "its triangulation differs from the one that this tool computes, so interpolated results \
-                       would change";
+            let why = "its triangulation differs from the one that this tool computes, so interpolated \
+                       results would change";
             return Err(ToolError::Usage(format!(
                 "{}: {why}; --retriangulate allows it",
                 args.source.file.display()

@@ -1,4 +1,4 @@
-//! Bytes of a third-party file: read where they are, never more than there are, and every failure with its place.
+//! Bytes of a third-party file: read at offsets, never beyond the end, and every failure with its offset.
 
 use crate::error::{Result, ToolError};
 use crate::files::read_exact_at;

@@ -3,12 +3,12 @@
 //! | module | does |
 //! |---|---|
 //! | [`btf`] | the containers of Bonn, `.btf` |
-//! | [`images`], [`archive`], [`pixels`] | sets of images in folders and zip archives (UBO2003, ATRIUM, UTIA), and the single image |
+//! | [`images`], [`archive`], [`pixels`] | sets of images in folders and zip archives, and the single image |
 //! | [`ubo`] | a set of images in the layout of UBO2003 |
 //! | [`bytes`] | a file that is read at offsets and never trusted |
 //!
-//! The files of SparseBTF have a module of their own, [`crate::methods::sparse_ensemble::sparsebtf`]: they are not expanded but taken
-//! over as they are.
+//! The files of SparseBTF have a module of their own, [`crate::methods::sparse_ensemble::sparsebtf`]: they are
+//! imported without re-encoding.
 
 pub mod archive;
 pub mod btf;
@@ -160,8 +160,16 @@ pub fn import_btf(
         match head.cosine_included {
             Some(true) => {}
             // The flag is not to be trusted: Bonn's own library leaves it 0 for pictures, which are radiance.
-            Some(false) => notes.push("the file says that values do not contain the cosine of the light's angle; --cosine included if they do".into()),
-            None => notes.push("the file does not say whether values contain the cosine of the light's angle; taken as if they do (--cosine)".into()),
+            Some(false) => notes.push(
+                "the file says that values do not contain the cosine of the light's angle; --cosine included \
+                 if they do"
+                    .into(),
+            ),
+            None => notes.push(
+                "the file does not say whether values contain the cosine of the light's angle; taken as if \
+                 they do (--cosine)"
+                    .into(),
+            ),
         }
     }
     Ok(Imported { statistics: writer.finish()?, notes })
@@ -250,7 +258,8 @@ impl ForeignInfo {
             format!("{} x {} nm", self.texel_nm[0], self.texel_nm[1])
         };
         let mut text = format!(
-            "{}\n  format      {}\n  origin      {}\n  licence     {}\n  size        {} x {} texels of {texel}\n  directions  {} light, {} view\n  cosine      {}\n  dataset     {} bytes in binary16\n",
+            "{}\n  format      {}\n  origin      {}\n  licence     {}\n  size        {} x {} texels of {texel}\n  \
+             directions  {} light, {} view\n  cosine      {}\n  dataset     {} bytes in binary16\n",
             known(&self.texts[0]),
             self.format,
             known(&self.texts[1]),

@@ -2,7 +2,9 @@
 //! JSON.
 
 use super::plot::{COSTS, ERRORS, draw};
-use super::{HeldOut, Kind, Line, Operations, methods_of, to_csv};
+use super::sweep::prefix_of;
+use super::table::{methods_of, to_csv};
+use super::{HeldOut, Kind, Line, Operations};
 use crate::error::{Result, ToolError};
 use crate::files;
 use crate::measure::speed::Rate;
@@ -11,7 +13,7 @@ use serde::Serialize;
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// What goes on the page.
+/// The contents of the page.
 pub struct Page<'a> {
     /// Measured lines.
     pub lines: &'a [Line],
@@ -42,7 +44,7 @@ figure{display:inline-block;margin:0 14px 14px 0;vertical-align:top}figcaption{f
 .wide{overflow-x:auto}p.note{color:#555;max-width:60em}";
 
 /// Text that is safe between tags and in attributes.
-pub fn escaped(text: &str) -> String {
+fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
@@ -227,10 +229,10 @@ fn held_table(lines: &[&HeldOut]) -> String {
     html + "</table>"
 }
 
-/// A picture as part of the page.
+/// A picture as a part of the page.
 fn embedded(out: &Path, name: &str) -> String {
     use base64::Engine as _;
-    // One that was taken away since leaves its words.
+    // A picture that was deleted since leaves its text.
     let bytes = files::read(&out.join(name)).unwrap_or_default();
     format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(bytes))
 }
@@ -298,6 +300,62 @@ fn scientific(v: f64) -> String {
     }
 }
 
+/// The plots of a dataset, each also as a file.
+///
+/// # Errors
+/// If a file cannot be written.
+fn plots(lines: &[&Line], reference: &str, out: &Path) -> Result<String> {
+    let mut html = String::new();
+    let prefix = prefix_of(reference).unwrap_or(reference);
+    for error in &ERRORS {
+        for cost in &COSTS {
+            match draw(lines, cost, error) {
+                Ok(svg) => {
+                    let name = format!("{prefix}-{}-{}.svg", error.short, cost.short);
+                    files::write(&out.join(name), svg.as_bytes())?;
+                    let _ = write!(
+                        html,
+                        "<figure>{svg}<figcaption>{} against {}. Dashed: values coded without a logarithm.\
+</figcaption></figure>",
+                        error.name, cost.name
+                    );
+                }
+                Err(why) => {
+                    let _ = write!(html, "<p>No plot of {} against {}: {why}.</p>", error.name, cost.name);
+                }
+            }
+        }
+    }
+    Ok(html)
+}
+
+/// The pictures of a dataset and of the lines that have one.
+fn pictures(lines: &[&Line], reference: &str, out: &Path) -> String {
+    let mut html = String::from(
+        "<h3>Pictures</h3><p class=\"note\">Two pairs of directions, decoded and the error of the logarithm in \
+false colour (black none, white 2).</p>",
+    );
+    let _ = write!(
+        html,
+        "<figure><img src=\"{}\" alt=\"the data\"><figcaption>the data</figcaption></figure><br>",
+        embedded(out, reference)
+    );
+    for l in lines.iter().filter(|l| l.picture.is_some()) {
+        let source = embedded(out, l.picture.as_deref().unwrap_or_default());
+        let _ = write!(
+            html,
+            "<figure><img src=\"{source}\" alt=\"{0}\"><figcaption>{0}, {1} bytes; log RMS {2:.3}, \
+linear RMS {3:.4}, FLIP {4:.3}</figcaption></figure>",
+            escaped(&l.method),
+            with_thousands(l.bytes),
+            l.metrics.log_rms,
+            l.metrics.linear_rms,
+            l.flip
+        );
+    }
+    html
+}
+
 impl Page<'_> {
     /// Writes `report.html`, `report.csv`, `report.json` and the plots.
     ///
@@ -309,7 +367,16 @@ impl Page<'_> {
         let json = serde_json::to_vec_pretty(&Json { adapter, cores, lines, held_out })
             .map_err(|e| ToolError::Mismatch(e.to_string()))?;
         files::write(&out.join("report.json"), &json)?;
-        let mut html = format!(
+        let mut html = self.heading();
+        for (name, reference) in datasets(lines) {
+            html += &self.dataset(name, reference, out)?;
+        }
+        files::write(&out.join("report.html"), html.as_bytes())
+    }
+
+    /// The top of the page: what was measured and how.
+    fn heading(&self) -> String {
+        format!(
             "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>Error against run time</title><style>{STYLE}</style><h1>Error against run time</h1>\
 <p class=\"note\">Methods of this format (bold) and baselines, each over a sweep of its size. Files are decoded by the core, bit for bit as any decoder would; baselines are decoded in \
 binary32 from what they would store. RMS, PSNR (peak: the largest value of the data), relative L2 and the largest error are over every texel and view, and the lights that a dataset's heading states; <i>log</i> is ln(x + e) with e one thousandth of the mean. SSIM and FLIP \
@@ -317,91 +384,54 @@ binary32 from what they would store. RMS, PSNR (peak: the largest value of the d
 each in turn with a reference routine, with the farther end of their range. In <i>random</i> and <i>coherent</i> files are sampled in batches of 8192, which locate directions and read records together, as a renderer that sorts its \
 samples would; baselines have no batches. <i>One by one</i> has none for either. Operations are multiplications of a filtered sample: of 32-bit integers in files, with 102 for matrix, transfer and \
 presentation, of floats in baselines, with seven for an exponential. Peak memory is since the work began that a method's settings share. Kernel: {}.</p>{}",
-            escaped(adapter),
+            escaped(self.adapter),
             if self.stability {
                 "<p><a href=\"stability.html\">Numerical stability on stiff and extreme cases</a></p>"
             } else {
                 ""
             }
+        )
+    }
+
+    /// The part of the page on a dataset; its plots are also written as files.
+    ///
+    /// # Errors
+    /// If a file cannot be written.
+    fn dataset(&self, name: &str, reference: &str, out: &Path) -> Result<String> {
+        let of = sorted(self.lines, reference);
+        let (every, peak) = of.first().map_or((1, 0.0), |l| (l.every, l.metrics.peak));
+        let lights = if every == 1 {
+            "at every light".to_owned()
+        } else {
+            format!("at one light of {every}, another at each view")
+        };
+        let mut html = format!(
+            "<h2>{}</h2><p class=\"note\">Compared {lights}; largest value {peak}.</p>",
+            escaped(name)
         );
-        for (name, reference) in datasets(lines) {
-            let of = sorted(lines, reference);
-            let (every, peak) = of.first().map_or((1, 0.0), |l| (l.every, l.metrics.peak));
-            let lights = if every == 1 {
-                "at every light".to_owned()
-            } else {
-                format!("at one light of {every}, another at each view")
-            };
+        html += &plots(&of, reference, out)?;
+        let _ = write!(
+            html,
+            "<h3>Bytes at equal error</h3><p class=\"note\">Between measured points, by their logarithms; - where a method was not measured on both sides.</p><p>Linear RMS</p>{}<p>Log RMS</p>{}",
+            at_equal_error(&of, |l| l.metrics.linear_rms),
+            at_equal_error(&of, |l| l.metrics.log_rms)
+        );
+        html += &pictures(&of, reference, out);
+        let _ = write!(
+            html,
+            "<h3>All settings</h3>{}<h3>Rates, millions of samples a second</h3>{}",
+            main_table(&of),
+            speed_table(&of, self.cores)
+        );
+        let held: Vec<&HeldOut> = self.held_out.iter().filter(|h| h.dataset == name).collect();
+        if !held.is_empty() {
             let _ = write!(
                 html,
-                "<h2>{}</h2><p class=\"note\">Compared {lights}; largest value {peak}.</p>",
-                escaped(name)
-            );
-            for error in &ERRORS {
-                for cost in &COSTS {
-                    match draw(&of, cost, error) {
-                        Ok(svg) => {
-                            files::write(
-                                &out.join(format!(
-                                    "{}-{}-{}.svg",
-                                    reference.trim_end_matches("-data.png"),
-                                    error.short,
-                                    cost.short
-                                )),
-                                svg.as_bytes(),
-                            )?;
-                            let _ = write!(
-                                html,
-                                "<figure>{svg}<figcaption>{} against {}. Dashed: values coded without a logarithm.</figcaption></figure>",
-                                error.name, cost.name
-                            );
-                        }
-                        Err(why) => {
-                            html += &format!("<p>No plot of {} against {}: {why}.</p>", error.name, cost.name)
-                        }
-                    }
-                }
-            }
-            let _ = write!(
-                html,
-                "<h3>Bytes at equal error</h3><p class=\"note\">Between measured points, by their logarithms; - where a method was not measured on both sides.</p><p>Linear RMS</p>{}<p>Log RMS</p>{}",
-                at_equal_error(&of, |l| l.metrics.linear_rms),
-                at_equal_error(&of, |l| l.metrics.log_rms)
-            );
-            html += "<h3>Pictures</h3><p class=\"note\">Two pairs of directions, decoded and the error of the logarithm in false colour (black none, white 2).</p>";
-            let _ = write!(
-                html,
-                "<figure><img src=\"{}\" alt=\"the data\"><figcaption>the data</figcaption></figure><br>",
-                embedded(out, reference)
-            );
-            for l in of.iter().filter(|l| l.picture.is_some()) {
-                let source = embedded(out, l.picture.as_deref().unwrap_or_default());
-                let _ = write!(
-                    html,
-                    "<figure><img src=\"{source}\" alt=\"{0}\"><figcaption>{0}, {1} bytes; log RMS {2:.3}, linear RMS {3:.4}, FLIP {4:.3}</figcaption></figure>",
-                    escaped(&l.method),
-                    with_thousands(l.bytes),
-                    l.metrics.log_rms,
-                    l.metrics.linear_rms,
-                    l.flip
-                );
-            }
-            let _ = write!(
-                html,
-                "<h3>All settings</h3>{}<h3>Rates, millions of samples a second</h3>{}",
-                main_table(&of),
-                speed_table(&of, cores)
-            );
-            let held: Vec<&HeldOut> = held_out.iter().filter(|h| h.dataset == name).collect();
-            if !held.is_empty() {
-                let _ = write!(
-                    html,
-                    "<h3>Directions held out</h3><p class=\"note\">The same budget without every seventh direction inside the hemisphere; errors at pairs that were encoded, and at pairs of a light and a view that \
+                "<h3>Directions held out</h3><p class=\"note\">The same budget without every seventh direction inside the hemisphere; errors at pairs that were encoded, and at pairs of a light and a view that \
 were not. The uncompressed data lose there too, by interpolating between directions; they are blended as radiance, where methods in the logarithm blend logarithms.</p>{}",
-                    held_table(&held)
-                );
-            }
+                held_table(&held)
+            );
         }
-        files::write(&out.join("report.html"), html.as_bytes())
+        Ok(html)
     }
 }

@@ -68,8 +68,8 @@ fn add_ground(mesh: &mut Mesh, height: f32, steps: usize, look: Look) {
     mesh.add_height_field(steps, |_, _| height, |_, _| look);
 }
 
-/// Height of a yarn on its way over and under others: `over` is asked for each crossing, with crossings at half
-/// numbers.
+/// Height of a yarn on its way over and under others: `over` is asked for each crossing, with crossings at
+/// half numbers.
 fn wave(at: f32, over: impl Fn(i32) -> bool) -> f32 {
     let before = (at - 0.5).floor();
     let t = at - 0.5 - before;

@@ -47,7 +47,8 @@ pub fn export(
             .find(|&i| set[..i].iter().any(|&other| degrees_between(other, set[i]) < SAME_DEGREES))
         {
             let what = format!(
-                "{what} direction {i} is within {SAME_DEGREES} degrees of an earlier one; an import would take them for the same"
+                "{what} direction {i} is within {SAME_DEGREES} degrees of an earlier one; an import would take them \
+                 for the same"
             );
             return Err(bad(dataset.path(), what));
         }
