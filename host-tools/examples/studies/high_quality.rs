@@ -68,13 +68,9 @@ fn run(path: &Path, edge: usize, thresholds: &[f64]) -> Result<()> {
         let encoded = encode(&prepared, &ensembles, &options, &|_, _| ())?;
         let file = selvedge::open(&encoded.bytes, &Limits::NONE)
             .map_err(|finding| ToolError::Mismatch(format!("a file just written: {finding}")))?;
-        let comparison = Comparison {
-            description: dataset.description(),
-            log_offset: offset,
-            peak: None,
-            every: EVERY,
-        };
-        let found = comparison.run(&&dataset, &AtLevel { file: &file, level: 0 }, &|_, _| ())?;
+        let comparison =
+            Comparison { description: dataset.description(), log_offset: offset, peak: None, every: EVERY };
+        let found = comparison.run(&dataset, &AtLevel::finest(&file), &|_, _| ())?;
         let (bytes, count) = (encoded.bytes.len() as u64, encoded.coefficients.iter().sum::<usize>());
         let (ratio, operations) =
             (dataset.description().half_bytes() as f64 / bytes as f64, file.header().operations);

@@ -105,7 +105,7 @@ fn ours(dataset: &Dataset, budgets: &[u64]) -> Result<Vec<Ours>> {
                 .map_err(|finding| ToolError::Mismatch(format!("a file just written: {finding}")))?;
             let metrics = compare(
                 dataset,
-                AtLevel { file: &file, level: 0 },
+                &AtLevel::finest(&file),
                 dataset.description(),
                 log_offset,
                 None,

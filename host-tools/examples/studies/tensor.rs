@@ -67,7 +67,7 @@ fn main() -> Result<()> {
             selvedge::open(&encoded.bytes, &Limits::NONE).unwrap_or_else(|finding| panic!("{finding}"));
         let metrics = compare(
             &data,
-            AtLevel { file: &file, level: 0 },
+            &AtLevel::finest(&file),
             data.description(),
             data.statistics().log_offset(),
             None,

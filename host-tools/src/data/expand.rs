@@ -39,7 +39,7 @@ pub fn expand(
         let count = batch.min(pairs - first);
         let image = |i: usize| {
             let pair = first + i;
-            compare::image(AtLevel { file, level: 0 }, &description, pair % lights, pair / lights)
+            compare::image(&AtLevel::finest(file), &description, pair % lights, pair / lights)
         };
         let images = (0..count).into_par_iter().map(image).collect::<Result<Vec<_>>>()?;
         writer.put_images(first, &images)?;

@@ -104,7 +104,7 @@ pub fn log_offset(file: &Selvedge<'_>) -> f32 {
     let mut images_at = Vec::new();
     let mut statistics = Statistics::default();
     let first_view: Vec<usize> = (0..description.lights.len()).collect();
-    if images(&AtLevel { file, level: 0 }, &description, &first_view, &mut images_at).is_ok() {
+    if images(&AtLevel::finest(file), &description, &first_view, &mut images_at).is_ok() {
         let count = images_at.len().max(1) as f64;
         statistics.mean =
             std::array::from_fn(|c| images_at.iter().map(|rgb| rgb[c] as f64).sum::<f64>() / count);
@@ -126,13 +126,13 @@ pub fn nearest(set: &[glam::DVec3], asked: Direction) -> usize {
 /// # Errors
 /// If data cannot be read.
 pub fn image(
-    source: impl Radiance,
+    source: &dyn Radiance,
     description: &Description,
     light: usize,
     view: usize,
 ) -> Result<Vec<[f32; 3]>> {
     let mut out = Vec::new();
-    images(&source, description, &[view * description.lights.len() + light], &mut out)?;
+    images(source, description, &[view * description.lights.len() + light], &mut out)?;
     Ok(out)
 }
 
@@ -224,14 +224,14 @@ pub struct Comparison<'a> {
 /// # Errors
 /// If the sizes differ or data cannot be read.
 pub fn compare(
-    reference: impl Radiance,
-    other: impl Radiance,
+    reference: &dyn Radiance,
+    other: &dyn Radiance,
     description: &Description,
     log_offset: f32,
     peak: Option<f64>,
     progress: &dyn Fn(usize, usize),
 ) -> Result<Metrics> {
-    Comparison { description, log_offset, peak, every: 1 }.run(&reference, &other, progress)
+    Comparison { description, log_offset, peak, every: 1 }.run(reference, other, progress)
 }
 
 impl Comparison<'_> {

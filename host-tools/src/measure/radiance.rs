@@ -34,7 +34,7 @@ pub trait Radiance: Sync {
     fn images(&self, reference: &Description, pairs: &[usize], out: &mut [[f32; 3]]) -> Result<()>;
 }
 
-impl Radiance for &Dataset {
+impl Radiance for Dataset {
     fn size(&self) -> [usize; 2] {
         self.description().size
     }
@@ -68,6 +68,24 @@ impl Radiance for &Dataset {
     }
 }
 
+impl<T: Radiance + ?Sized> Radiance for &T {
+    fn size(&self) -> [usize; 2] {
+        (**self).size()
+    }
+
+    fn check_directions(&self, reference: &Description) -> Result<()> {
+        (**self).check_directions(reference)
+    }
+
+    fn images_at_once(&self) -> usize {
+        (**self).images_at_once()
+    }
+
+    fn images(&self, reference: &Description, pairs: &[usize], out: &mut [[f32; 3]]) -> Result<()> {
+        (**self).images(reference, pairs, out)
+    }
+}
+
 /// An open file, decoded by the core at a level of detail.
 #[derive(Clone, Copy)]
 pub struct AtLevel<'a> {
@@ -75,6 +93,13 @@ pub struct AtLevel<'a> {
     pub file: &'a Selvedge<'a>,
     /// The level.
     pub level: u32,
+}
+
+impl<'a> AtLevel<'a> {
+    /// A file at its finest level.
+    pub fn finest(file: &'a Selvedge<'a>) -> AtLevel<'a> {
+        AtLevel { file, level: 0 }
+    }
 }
 
 impl Radiance for AtLevel<'_> {
@@ -130,45 +155,5 @@ impl Radiance for Baseline<'_> {
             begun += same.len();
         }
         Ok(())
-    }
-}
-
-/// Any of the three, chosen at run time.
-#[derive(Clone, Copy)]
-pub enum Source<'a> {
-    /// Data.
-    Data(&'a Dataset),
-    /// A file, decoded by the core at a level of detail.
-    File(&'a Selvedge<'a>, u32),
-    /// A baseline, and what finds its directions.
-    Baseline(&'a dyn Decoder, &'a Locator<'a>),
-}
-
-impl Source<'_> {
-    /// Calls `with` with what it is.
-    fn with<T>(self, with: impl FnOnce(&dyn Radiance) -> T) -> T {
-        match self {
-            Source::Data(dataset) => with(&dataset),
-            Source::File(file, level) => with(&AtLevel { file, level }),
-            Source::Baseline(decoder, locator) => with(&Baseline { decoder, locator }),
-        }
-    }
-}
-
-impl Radiance for Source<'_> {
-    fn size(&self) -> [usize; 2] {
-        self.with(|of| of.size())
-    }
-
-    fn check_directions(&self, reference: &Description) -> Result<()> {
-        self.with(|of| of.check_directions(reference))
-    }
-
-    fn images_at_once(&self) -> usize {
-        self.with(|of| of.images_at_once())
-    }
-
-    fn images(&self, reference: &Description, pairs: &[usize], out: &mut [[f32; 3]]) -> Result<()> {
-        self.with(|of| of.images(reference, pairs, out))
     }
 }

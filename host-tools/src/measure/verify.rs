@@ -32,6 +32,6 @@ pub fn verify(
     let file = open_made(bytes, dictionary)?;
     let (offset, peak) = (data.statistics().log_offset(), Some(data.statistics().largest as f64));
     let comparison = Comparison { description: data.description(), log_offset: offset, peak, every };
-    let metrics = comparison.run(&data, &AtLevel { file: &file, level: 0 }, progress)?;
+    let metrics = comparison.run(data, &AtLevel::finest(&file), progress)?;
     Ok((metrics, file.header().operations))
 }

@@ -17,7 +17,6 @@ pub mod options;
 mod ranges;
 pub mod shapes;
 
-pub use crate::data::transfer::transfer_of;
 pub use coder::{encode, encode_fit};
 pub use options::{Encoded, Options};
 pub use shapes::ShapeSearch;
@@ -48,7 +47,7 @@ mod tests {
         let file = selvedge::open(bytes, &Limits::NONE).unwrap_or_else(|finding| panic!("{finding}"));
         let metrics = compare(
             data,
-            AtLevel { file: &file, level: 0 },
+            &AtLevel::finest(&file),
             data.description(),
             data.statistics().log_offset(),
             None,
