@@ -1,4 +1,4 @@
-//! What several tests share: where the data are, loud words for what is skipped, files of others, and the
+//! What several tests share: where the data are, loud messages about what is skipped, third-party files, and the
 //! bodies of the fuzz targets.
 
 pub mod foreign;

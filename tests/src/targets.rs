@@ -33,7 +33,7 @@ pub struct Target {
     pub name: &'static str,
     /// What it does with any bytes.
     pub run: fn(&[u8]),
-    /// Bytes of heap that it may take beyond twice the input, if that is bounded: for the files of others.
+    /// Bytes of heap that it may take beyond twice the input, if that is bounded: for third-party files.
     pub memory: Option<usize>,
 }
 
@@ -371,7 +371,7 @@ pub fn paths(data: &[u8]) {
     }
 }
 
-/// Reads bytes as every kind of foreign or working file that there is.
+/// Reads bytes as every kind of third-party or working file that there is.
 pub fn importers(data: &[u8]) {
     let mut rest = data;
     let kind = take(&mut rest);

@@ -107,7 +107,10 @@ impl DataArgs {
     }
 }
 
-/// Imports what the content of the source says it is.
+/// Imports a source by what its content is.
+///
+/// # Errors
+/// If options do not apply to that kind of source, the data are damaged, and on I/O.
 pub fn run(args: Arguments) -> Result<u8> {
     match foreign::detect(&args.source)? {
         Kind::SparseBtf => {

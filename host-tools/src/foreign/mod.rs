@@ -219,7 +219,7 @@ pub struct ForeignInfo {
     pub size: [usize; 2],
     /// Light and view directions.
     pub directions: [usize; 2],
-    /// The light's cosine is in the values, as the data say or as is usual.
+    /// The light's cosine is in the values, as the data state or by default.
     pub cosine_included: bool,
     /// Width and height of a texel in nanometres, 0 if unknown.
     pub texel_nm: [u32; 2],
@@ -229,7 +229,7 @@ pub struct ForeignInfo {
     pub dataset_bytes: u64,
     /// Mean, least and largest value, where they are known without reading all.
     pub statistics: Option<Statistics>,
-    /// What stands in the head of a `.btf`.
+    /// The header of a `.btf`.
     pub btf: Option<btf::Head>,
 }
 

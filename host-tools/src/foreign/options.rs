@@ -8,8 +8,8 @@ use crate::data::dataset::{Description, Sample, Statistics};
 pub struct ImportOptions {
     /// How values are stored.
     pub sample: Sample,
-    /// Whether values contain the cosine of the light's angle; if it is not said, as the data say, and if
-    /// they do not, yes.
+    /// Whether values contain the cosine of the light's angle; if `None`, as the data state it, and if they
+    /// do not, yes.
     pub cosine_included: Option<bool>,
     /// Name of the material; if empty, that of the data.
     pub name: String,
@@ -46,7 +46,7 @@ impl ImportOptions {
         format!("{value} is not a radiance from 0 to {:e}{hint}", self.sample.largest())
     }
 
-    /// A description of data, completed by what the user says.
+    /// A description of data, completed by the user's options.
     pub(super) fn describe(&self, found: &Description) -> Description {
         let asked = [&self.name, &self.origin, &self.licence];
         let texts =

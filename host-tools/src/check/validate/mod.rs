@@ -1,8 +1,8 @@
 //! `validate`: every finding of a file, as the core's own checker reports it, and what is legal but wasteful.
 //!
-//! There is no second parser: [`selvedge::open_reporting`] is `open` with a sink that goes on. What this module
-//! adds is words: severity, hints, counts, and reports as text, JSON ([`Reports`] is the published schema)
-//! and SARIF.
+//! There is no second parser: [`selvedge::open_reporting`] is `open` with a sink that continues after a
+//! finding. This module adds severities, hints, counts, and reports as text, JSON ([`Reports`] is the
+//! published schema) and SARIF.
 
 mod advice;
 mod hints;

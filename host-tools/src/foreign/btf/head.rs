@@ -14,7 +14,7 @@ pub(super) const OLD_VIEWS: u32 = 301_074;
 /// Most channels whose names are read.
 const MOST_CHANNELS: u32 = 4096;
 
-/// What stands before the values, and in a word what they are.
+/// The fields before the values, and the layout of the values in words.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Head {
     /// Which of the formats it is.
@@ -31,7 +31,7 @@ pub struct Head {
     pub pixels_per_mm: f32,
     /// Scale of the colours as the file states it; no known reader applies it.
     pub rgb_scale: [f32; 3],
-    /// Whether the values contain the cosine of the light's angle, if the file says.
+    /// Whether the values contain the cosine of the light's angle, if the file states it.
     pub cosine_included: Option<bool>,
     /// Names of the channels.
     pub channels: Vec<String>,

@@ -119,7 +119,7 @@ impl Btf {
         Ok(Btf { bytes, head, body, heights })
     }
 
-    /// What the file says of itself.
+    /// The header.
     pub fn head(&self) -> &Head {
         &self.head
     }

@@ -31,7 +31,7 @@ impl ImageSet {
     /// Reads names, directions and the size of the first image.
     ///
     /// # Errors
-    /// If the listing or a name is not as the module says; if a pair of directions is missing or there twice;
+    /// If the listing or a name is not as the module says; if a pair of directions is missing or given twice;
     /// if the first image cannot be decoded; on I/O.
     pub fn open(path: &Path, memory: usize) -> Result<ImageSet> {
         ImageSet::of(Archive::open(path)?, memory)
@@ -72,7 +72,7 @@ impl ImageSet {
         Ok(ImageSet { archive, names, description })
     }
 
-    /// What the set says of itself.
+    /// The set as a dataset would be described.
     pub fn description(&self) -> &Description {
         &self.description
     }

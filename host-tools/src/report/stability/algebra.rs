@@ -3,10 +3,11 @@
 use super::files::dataset;
 use super::{Case, Outcome, case};
 use crate::data::directions;
+use crate::data::transfer::Domain;
 use crate::error::{Result, ToolError};
 use crate::math::linear::{eigenbasis, nearest_orthogonal, orthonormal, product_at};
 use crate::math::random::Random;
-use crate::measure::baseline::pca::{Domain, pca};
+use crate::measure::baseline::pca;
 use std::path::Path;
 
 /// A random matrix with singular values that fall from one to `1 / condition`, `rows x columns`, row-major.
@@ -120,7 +121,7 @@ fn components(folder: &Path, rank: usize, scale: f64) -> Result<Outcome> {
     };
     let data = dataset(folder, [12, 9], &set[..9], &set[..7], value)?;
     // The mean takes one, which is no component.
-    let mut whole = pca(&data, Domain::Linear, 8)?;
+    let mut whole = pca::components(&data, Domain::Linear, 8)?;
     let row = whole.measure(rank, 16)?;
     let of_mean = whole.mean.iter().map(|m| (*m as f64).powi(2)).sum::<f64>() * 108.0;
     let rms = ((whole.energy + of_mean) / (108.0 * whole.mean.len() as f64)).sqrt();

@@ -1,11 +1,11 @@
 //! What the cases share: small datasets and files of them, and directions.
 
 use crate::data::dataset::{Dataset, Description, Sample};
+use crate::data::transfer::Domain;
 use crate::encode::encoder::{self, Common, Encoder, Levels};
 use crate::encode::goal::Goal;
 use crate::error::{Result, ToolError};
 use crate::math::random::Random;
-use crate::measure::baseline::pca::Domain;
 use crate::methods::sparse_ensemble::encode::encoder::SparseEnsemble;
 use crate::methods::sparse_tensor::encode::encoder::SparseTensor;
 use crate::methods::sparse_tensor::encode::fit::{Shape, Training};

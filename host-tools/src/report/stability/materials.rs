@@ -3,9 +3,9 @@
 use super::files::{dataset, encoded, opened};
 use super::{Case, Outcome, case};
 use crate::data::directions;
+use crate::data::transfer::Domain;
 use crate::encode::goal::{domain_name, rms_of};
 use crate::error::Result;
-use crate::measure::baseline::pca::Domain;
 use crate::measure::compare::compare;
 use crate::measure::radiance::AtLevel;
 use crate::methods::{METHODS, Method};

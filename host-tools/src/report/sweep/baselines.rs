@@ -2,10 +2,11 @@
 
 use super::swept::{Curve, Made, Shared, Swept, Visitor, What};
 use crate::data::dataset::Dataset;
+use crate::data::transfer::Domain;
 use crate::encode::goal::domain_name;
 use crate::error::Result;
 use crate::measure::baseline::data::Uncompressed as Values;
-use crate::measure::baseline::pca::{Domain, Pca};
+use crate::measure::baseline::pca::Components;
 use crate::measure::baseline::{clusters, published, tucker};
 use std::time::Instant;
 
@@ -67,7 +68,7 @@ const BITS: u32 = 8;
 /// # Errors
 /// If data cannot be read.
 fn best_clusters<'a, 'd>(
-    whole: &'a Pca<'d>,
+    whole: &'a Components<'d>,
     data: &Dataset,
     budget: u64,
 ) -> Result<Option<clusters::Clusters<'a, 'd>>> {

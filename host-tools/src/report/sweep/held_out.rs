@@ -3,8 +3,8 @@
 use super::swept::{Made, Memory, Visitor, everything};
 use super::{Keys, finder, known, locator};
 use crate::data::dataset::{Dataset, Description, Writer};
-use crate::encode::goal::open_made;
 use crate::error::{Result, ToolError};
+use crate::measure::verify::open_made;
 use crate::report::HeldOut;
 use crate::report::store::Store;
 use std::path::Path;

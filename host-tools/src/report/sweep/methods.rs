@@ -2,12 +2,12 @@
 //! encoders alone.
 
 use super::swept::{Curve, Made, Shared, Swept, Visitor, What};
+use crate::data::transfer::Domain;
 use crate::data::transfer::transfer_of;
 use crate::encode::ENCODERS;
 use crate::encode::encoder::{self, Common, Encoder, Levels};
 use crate::encode::goal::{Goal, Target, domain_name};
 use crate::error::Result;
-use crate::measure::baseline::pca::Domain;
 use crate::methods::sparse_ensemble::encode::{self, prepare};
 use crate::methods::sparse_tensor::encode::{ShapeSearch, fit};
 use crate::methods::{by_name, sparse_ensemble, sparse_tensor};

@@ -3,10 +3,12 @@
 use super::baselines::{LocalPca, Published, Truncated, Tucker, Uncompressed};
 use super::methods::{Ensembles, Tensor, other_methods};
 use crate::data::dataset::Dataset;
-use crate::encode::goal::{domain_name, open_made};
+use crate::data::transfer::Domain;
+use crate::encode::goal::domain_name;
 use crate::error::{Result, ToolError};
 use crate::measure::baseline::decoder::Decoder;
-use crate::measure::baseline::pca::{Domain, Pca, pca};
+use crate::measure::baseline::pca;
+use crate::measure::verify::open_made;
 use crate::report::bench::Subject;
 use crate::report::memory::{forget_peak, peak_memory};
 use std::cell::Cell;
@@ -95,7 +97,7 @@ pub(super) struct Shared<'d> {
 /// The components of a dataset, and what making them took.
 pub(super) struct Components<'d> {
     /// The components.
-    pub(super) pca: Pca<'d>,
+    pub(super) pca: pca::Components<'d>,
     /// Seconds.
     pub(super) seconds: f64,
     /// The largest memory, bytes, where the system reports it.
@@ -118,7 +120,7 @@ impl<'d> Shared<'d> {
                 visitor.begin();
                 (visitor.log)(&format!("{} components, {}", self.rank, domain_name(self.domain)));
                 let start = Instant::now();
-                let pca = pca(self.data, self.domain, self.rank)?;
+                let pca = pca::components(self.data, self.domain, self.rank)?;
                 Components { pca, seconds: start.elapsed().as_secs_f64(), peak: visitor.memory.peak() }
             }
         };
