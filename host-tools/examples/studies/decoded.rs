@@ -9,7 +9,8 @@ use selvedge::{Limits, Rgb};
 use selvedge_tools::data::dataset::{Dataset, Description, Sample, Writer};
 use selvedge_tools::error::{Result, ToolError};
 use selvedge_tools::files;
-use selvedge_tools::measure::compare::{describe, query};
+use selvedge_tools::format::query::query;
+use selvedge_tools::measure::compare::describe;
 use std::path::Path;
 
 fn main() -> Result<()> {

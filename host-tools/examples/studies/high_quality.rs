@@ -13,7 +13,8 @@ use selvedge::Limits;
 use selvedge_tools::data::dataset::Dataset;
 use selvedge_tools::error::{Result, ToolError};
 use selvedge_tools::format::model::TransferModel;
-use selvedge_tools::measure::compare::{Source, compare_every};
+use selvedge_tools::measure::compare::Comparison;
+use selvedge_tools::measure::radiance::AtLevel;
 use selvedge_tools::methods::sparse_ensemble::encode::candidates::{Keep, collect};
 use selvedge_tools::methods::sparse_ensemble::encode::{Criterion, Options, encode, prepare};
 use std::path::Path;
@@ -67,15 +68,9 @@ fn run(path: &Path, edge: usize, thresholds: &[f64]) -> Result<()> {
         let encoded = encode(&prepared, &ensembles, &options, &|_, _| ())?;
         let file = selvedge::open(&encoded.bytes, &Limits::NONE)
             .map_err(|finding| ToolError::Mismatch(format!("a file just written: {finding}")))?;
-        let found = compare_every(
-            EVERY,
-            Source::Data(&dataset),
-            Source::File(&file, 0),
-            dataset.description(),
-            offset,
-            None,
-            &|_, _| (),
-        )?;
+        let comparison =
+            Comparison { description: dataset.description(), log_offset: offset, peak: None, every: EVERY };
+        let found = comparison.run(&dataset, &AtLevel::finest(&file), &|_, _| ())?;
         let (bytes, count) = (encoded.bytes.len() as u64, encoded.coefficients.iter().sum::<usize>());
         let (ratio, operations) =
             (dataset.description().half_bytes() as f64 / bytes as f64, file.header().operations);

@@ -15,7 +15,8 @@ use selvedge_tools::error::{Result, ToolError};
 use selvedge_tools::format::model::TransferModel;
 use selvedge_tools::measure::baseline::pca::{Choice, components};
 use selvedge_tools::measure::baseline::published::Published;
-use selvedge_tools::measure::compare::{Metrics, Source, compare};
+use selvedge_tools::measure::compare::{Metrics, compare};
+use selvedge_tools::measure::radiance::AtLevel;
 use selvedge_tools::methods::sparse_ensemble::encode::{Criterion, Encoded, Options, encode, prepare};
 use selvedge_tools::methods::sparse_ensemble::model::ensembles;
 use std::path::Path;
@@ -103,8 +104,8 @@ fn ours(dataset: &Dataset, budgets: &[u64]) -> Result<Vec<Ours>> {
             let file = selvedge::open(&encoded.bytes, &Limits::NONE)
                 .map_err(|finding| ToolError::Mismatch(format!("a file just written: {finding}")))?;
             let metrics = compare(
-                Source::Data(dataset),
-                Source::File(&file, 0),
+                dataset,
+                &AtLevel::finest(&file),
                 dataset.description(),
                 log_offset,
                 None,

@@ -12,7 +12,8 @@ use selvedge_tools::data::transfer::Domain;
 use selvedge_tools::encode::goal::Target;
 use selvedge_tools::error::{Result, ToolError};
 use selvedge_tools::measure::baseline::pca;
-use selvedge_tools::measure::compare::{Source, compare};
+use selvedge_tools::measure::compare::compare;
+use selvedge_tools::measure::radiance::AtLevel;
 use selvedge_tools::methods::sparse_tensor::encode::fit::{Shape, Training, fit};
 use selvedge_tools::methods::sparse_tensor::encode::{Options, encode_fit};
 use std::path::Path;
@@ -65,8 +66,8 @@ fn main() -> Result<()> {
         let file =
             selvedge::open(&encoded.bytes, &Limits::NONE).unwrap_or_else(|finding| panic!("{finding}"));
         let metrics = compare(
-            Source::Data(&data),
-            Source::File(&file, 0),
+            &data,
+            &AtLevel::finest(&file),
             data.description(),
             data.statistics().log_offset(),
             None,

@@ -5,7 +5,8 @@ use super::parse;
 use crate::data::picture;
 use crate::encode::parse::positive;
 use crate::error::{Result, ToolError};
-use crate::measure::compare::{self, Metrics, Place, Source};
+use crate::measure::compare::{self, Metrics, Place};
+use crate::measure::radiance::{AtLevel, Radiance};
 use crate::progress::Progress;
 use clap::{Args, ValueEnum};
 use selvedge::{Direction, Limits, Selvedge};
@@ -92,10 +93,10 @@ fn compare(args: Arguments) -> Result<u8> {
     let [a, b] = [&args.reference, &args.other].map(|path| Given::open(path, args.dictionary.as_deref()));
     let (a, b) = (a?, b?);
     let (file_a, file_b) = (a.opened(&args.reference, &limits)?, b.opened(&args.other, &limits)?);
-    fn source<'a>(given: &'a Given, file: &'a Option<Selvedge<'a>>) -> Source<'a> {
+    fn source<'a>(given: &'a Given, file: &'a Option<Selvedge<'a>>) -> Box<dyn Radiance + 'a> {
         match (given, file) {
-            (Given::Data(data), _) => Source::Data(data),
-            (_, Some(file)) => Source::File(file, 0),
+            (Given::Data(data), _) => Box::new(data),
+            (_, Some(file)) => Box::new(AtLevel::finest(file)),
             (Given::File(..), None) => unreachable!("a file is opened or refused"),
         }
     }
@@ -106,7 +107,7 @@ fn compare(args: Arguments) -> Result<u8> {
         (Given::File(..), None) => unreachable!("a file is opened or refused"),
     };
     let progress = Progress::new();
-    let metrics = compare::compare(reference, other, &description, offset, args.peak, &|done, all| {
+    let metrics = compare::compare(&*reference, &*other, &description, offset, args.peak, &|done, all| {
         progress.report("comparing", done, all)
     })?;
     progress.clear();
@@ -118,7 +119,7 @@ fn compare(args: Arguments) -> Result<u8> {
     if let Some(path) = &args.picture {
         let [light, view] = [(&description.lights, args.light), (&description.views, args.view)]
             .map(|(set, asked)| compare::nearest(set, asked));
-        let [a, b] = [reference, other].map(|source| compare::image(source, &description, light, view));
+        let [a, b] = [&reference, &other].map(|source| compare::image(&**source, &description, light, view));
         picture::beside_error(&b?, &a?, description.size, offset, args.white as f32, args.exposure as f32)
             .save(path)?;
     }

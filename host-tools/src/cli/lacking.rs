@@ -1,7 +1,6 @@
 //! Commands of features that this build is without: they are listed in the help, and refuse by the
 //! feature's name.
 
-use crate::error::{Result, ToolError};
 use clap::Args;
 use std::ffi::OsString;
 
@@ -16,9 +15,9 @@ macro_rules! lacking {
     ($($feature:literal: $($command:ident),*;)*) => {$($(
         #[cfg(not(feature = $feature))]
         pub mod $command {
-            use super::*;
+            use crate::error::{Result, ToolError};
 
-            pub use super::Arguments;
+            pub use crate::cli::lacking::Arguments;
 
             /// Refuses.
             pub fn run(_: Arguments) -> Result<u8> {

@@ -193,7 +193,7 @@ impl Cursor<'_> {
         self.bytes.read_at(start, &mut bytes)?;
         let text = String::from_utf8_lossy(&bytes);
         let text = text.split('\0').next().unwrap_or_default();
-        Ok(super::clean(text))
+        Ok(super::options::clean(text))
     }
 
     /// Skips `length` bytes, which must be there.

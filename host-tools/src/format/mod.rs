@@ -29,6 +29,7 @@ pub mod bits;
 pub mod blend;
 pub mod container;
 pub mod model;
+pub mod query;
 pub mod renumber;
 pub mod sector;
 pub mod tables;

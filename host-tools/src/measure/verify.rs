@@ -2,7 +2,8 @@
 
 use crate::data::dataset::Dataset;
 use crate::error::{Result, ToolError};
-use crate::measure::compare::{Metrics, Source, compare_every};
+use crate::measure::compare::{Comparison, Metrics};
+use crate::measure::radiance::AtLevel;
 use selvedge::{Limits, Selvedge};
 
 /// Opens what an encoder made: that it breaks a rule is the encoder's fault.
@@ -30,7 +31,7 @@ pub fn verify(
 ) -> Result<(Metrics, u32)> {
     let file = open_made(bytes, dictionary)?;
     let (offset, peak) = (data.statistics().log_offset(), Some(data.statistics().largest as f64));
-    let (reference, decoded) = (Source::Data(data), Source::File(&file, 0));
-    let metrics = compare_every(every, reference, decoded, data.description(), offset, peak, progress)?;
+    let comparison = Comparison { description: data.description(), log_offset: offset, peak, every };
+    let metrics = comparison.run(data, &AtLevel::finest(&file), progress)?;
     Ok((metrics, file.header().operations))
 }

@@ -6,7 +6,8 @@ use crate::data::dataset::{Dataset, Description};
 use crate::data::picture::{Picture, log_error};
 use crate::error::Result;
 use crate::measure::baseline::decoder::{Decoder, Locator, POSITION};
-use crate::measure::compare::{self, Metrics, Source, compare_every};
+use crate::measure::compare::{self, Comparison, Metrics};
+use crate::measure::radiance::{AtLevel, Baseline, Radiance};
 use crate::measure::similarity::{flip, ssim};
 use crate::measure::speed::{self, Adapter, Speed};
 use rayon::prelude::*;
@@ -23,10 +24,10 @@ pub(super) enum Subject<'a> {
 
 impl<'a> Subject<'a> {
     /// As a source of radiance.
-    pub(super) fn source<'s>(&'s self, locator: &'s Locator<'s>) -> Source<'s> {
+    pub(super) fn source<'s>(&'s self, locator: &'s Locator<'s>) -> Box<dyn Radiance + 's> {
         match self {
-            Subject::File(file) => Source::File(file, 0),
-            Subject::Baseline(decoder) => Source::Baseline(*decoder, locator),
+            Subject::File(file) => Box::new(AtLevel::finest(file)),
+            Subject::Baseline(decoder) => Box::new(Baseline { decoder: *decoder, locator }),
         }
     }
 
@@ -43,15 +44,9 @@ impl<'a> Subject<'a> {
         offset: f32,
         peak: f32,
     ) -> Result<Metrics> {
-        let found = compare_every(
-            every,
-            Source::Data(data),
-            self.source(locator),
-            data.description(),
-            offset,
-            Some(peak as f64),
-            &|_, _| (),
-        )?;
+        let peak = Some(peak as f64);
+        let comparison = Comparison { description: data.description(), log_offset: offset, peak, every };
+        let found = comparison.run(data, &*self.source(locator), &|_, _| ())?;
         Ok(Metrics { psnr_db: found.psnr_db.clamp(-999.0, 999.0), ..found })
     }
 
@@ -119,9 +114,8 @@ impl<'a> Bench<'a> {
         every: Option<usize>,
         out: &'a Path,
     ) -> Result<Bench<'a>> {
-        let image = |pair: [usize; 2]| {
-            Ok((pair, compare::image(Source::Data(data), data.description(), pair[0], pair[1])?))
-        };
+        let image =
+            |pair: [usize; 2]| Ok((pair, compare::image(data, data.description(), pair[0], pair[1])?));
         let looked_at = pairs_looked_at(data.description()).into_iter().map(image).collect::<Result<_>>()?;
         let mean = data.statistics().mean.iter().sum::<f64>() / 3.0;
         let description = data.description();
@@ -158,7 +152,7 @@ impl<'a> Bench<'a> {
             image.iter().map(|rgb| rgb.map(|c| (c * self.exposure).clamp(0.0, 1.0))).collect()
         };
         let both = |([light, view], reference): &([usize; 2], Vec<[f32; 3]>)| -> Result<[f64; 2]> {
-            let image = compare::image(subject.source(self.locator), description, *light, *view)?;
+            let image = compare::image(&*subject.source(self.locator), description, *light, *view)?;
             let (a, b) = (shown(reference), shown(&image));
             Ok([ssim(&a, &b, description.size[0]), flip(&a, &b, description.size[0])])
         };
@@ -177,7 +171,7 @@ impl<'a> Bench<'a> {
         for i in [9, 38] {
             let ([light, view], reference) = &self.looked_at[i];
             let decoded = subject
-                .map(|s| compare::image(s.source(self.locator), description, *light, *view))
+                .map(|s| compare::image(&*s.source(self.locator), description, *light, *view))
                 .transpose()?;
             let [width, height] = description.size;
             let offset = self.data.statistics().log_offset();

@@ -8,7 +8,8 @@ use crate::encode::goal::{Goal, Verified};
 use crate::error::{Result, ToolError};
 use crate::files;
 use crate::format::model::{MetadataModel, TransferModel};
-use crate::measure::compare::{self, Source};
+use crate::measure::compare;
+use crate::measure::radiance::AtLevel;
 use crate::methods::sparse_ensemble::dictionary_file::{self, DictionaryFile, Training};
 use crate::methods::sparse_ensemble::encode::verified::encode_verified;
 use crate::methods::sparse_ensemble::encode::{Encoded, Options, prepare};
@@ -175,10 +176,10 @@ fn pictures(cloth: &Dataset, files: &[&[u8]], out: &Path) -> Result<()> {
     let file = opened(last)?;
     let description = cloth.description();
     for (number, [light, view]) in [[0, 0], [21, 3], [60, 42]].into_iter().enumerate() {
-        let [decoded, reference] = [Source::File(&file, 0), Source::Data(cloth)]
-            .map(|source| compare::image(source, description, light, view));
+        let decoded = compare::image(&AtLevel::finest(&file), description, light, view)?;
+        let reference = compare::image(cloth, description, light, view)?;
         let picture =
-            beside_error(&decoded?, &reference?, description.size, cloth.statistics().log_offset(), 1.0, 1.0);
+            beside_error(&decoded, &reference, description.size, cloth.statistics().log_offset(), 1.0, 1.0);
         picture.save(&out.join(format!("cloth-{number}.png")))?;
     }
     let light = glam::DVec3::new(-0.45, 0.5, 0.74).normalize();

@@ -1,6 +1,8 @@
 //! Findings as SARIF 2.1.0, the form in which code hosts and editors show what checkers found.
 
-use super::{ADVICE, FileReport, Severity, hint};
+use super::advice::ADVICE;
+use super::hints::hint;
+use super::report::{FileReport, Severity};
 use selvedge::Rule;
 use serde_json::{Value, json};
 

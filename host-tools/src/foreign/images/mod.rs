@@ -27,11 +27,13 @@
 //!
 //! | module | does |
 //! |---|---|
+//! | `listing` | the listing of a folder |
 //! | `names` | the images of a folder or an archive, and their angles |
 //! | `pairs` | sets of directions, and the image of every pair |
 //! | `read` | the set as a dataset |
 //! | `write` | a dataset as a set |
 
+mod listing;
 mod names;
 mod pairs;
 mod read;
@@ -39,44 +41,7 @@ mod read;
 mod tests;
 mod write;
 
+pub use listing::SAME_DEGREES;
 pub(super) use pairs::degrees_between;
 pub use read::{ImageSet, import};
 pub use write::{Format, export};
-
-use crate::error::ToolError;
-use glam::DVec3;
-use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
-
-/// The file that may list the images.
-const LISTING: &str = "dataset.json";
-/// Directions closer than this are the same, in degrees.
-pub const SAME_DEGREES: f64 = 0.01;
-
-/// `dataset.json`.
-#[derive(Default, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-struct Listing {
-    cosine_included: Option<bool>,
-    texel_nm: [u32; 2],
-    name: String,
-    origin: String,
-    licence: String,
-    lights: Vec<DVec3>,
-    views: Vec<DVec3>,
-    images: Option<Vec<Entry>>,
-}
-
-/// An image of the listing; directions are polar angle and azimuth in degrees.
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Entry {
-    file: PathBuf,
-    light: [f64; 2],
-    view: [f64; 2],
-}
-
-/// What is wrong with a file or a folder of images.
-fn bad(path: &Path, what: impl Into<String>) -> ToolError {
-    ToolError::Picture { path: path.to_owned(), what: what.into() }
-}

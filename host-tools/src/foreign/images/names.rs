@@ -1,6 +1,6 @@
 //! The images of a folder or an archive, listed or by their names, and the angles in names.
 
-use super::{Entry, LISTING, bad};
+use super::listing::{Entry, LISTING, bad};
 use crate::error::Result;
 use crate::foreign::archive::Archive;
 use std::path::{Component, Path};

@@ -1,7 +1,7 @@
 //! The directions of a set of images, and which image is of which pair of them.
 
+use super::listing::{Entry, LISTING, SAME_DEGREES, bad};
 use super::names::in_name;
-use super::{Entry, LISTING, SAME_DEGREES, bad};
 use crate::data::dataset::MOST_DIRECTIONS;
 use crate::data::directions::{from_degrees, grid, to_degrees};
 use crate::error::Result;
@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 /// The angle between two directions; NaN if one has no length.
-pub(in crate::foreign) fn degrees_between(a: DVec3, b: DVec3) -> f64 {
+pub fn degrees_between(a: DVec3, b: DVec3) -> f64 {
     // The chord, which is precise where the arc's cosine is not, and the arc wherever it matters here.
     (a.normalize() - b.normalize()).length().to_degrees()
 }

@@ -1,12 +1,13 @@
 //! A set of images as a dataset.
 
+use super::listing::{LISTING, Listing, bad};
 use super::names::find;
 use super::pairs::{arrange, set_of};
-use super::{LISTING, Listing, bad};
 use crate::data::dataset::{Description, Sample, Writer, first_beyond};
 use crate::error::{Result, ToolError};
 use crate::foreign::archive::Archive;
-use crate::foreign::{Clipped, ImportOptions, Imported, pixels};
+use crate::foreign::options::{Clipped, ImportOptions, Imported};
+use crate::foreign::pixels;
 use rayon::prelude::*;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};

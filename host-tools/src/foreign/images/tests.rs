@@ -1,16 +1,18 @@
 //! Round trips, names, and what is refused.
 
+use super::listing::LISTING;
 use super::names::angles_of;
 use super::read::import;
 use super::write::{Format, export, to_exr, to_png, to_srgb16};
-use super::*;
 use crate::data::dataset::{Dataset, Description, Sample};
 use crate::data::directions::{from_degrees, grid, to_degrees};
 use crate::foreign::ImportOptions;
 use crate::foreign::pixels::{self, Colours, from_srgb16};
 use exr::prelude::{Image, SpecificChannels, Vec2, WritableImage as _, f16};
+use glam::DVec3;
 use std::fs::{self, File};
 use std::io::BufReader;
+use std::path::Path;
 
 /// The pixels of an image on disk.
 fn decode(path: &Path) -> std::result::Result<Vec<[f32; 3]>, String> {

@@ -1,8 +1,8 @@
 //! A dataset as a folder of images.
 
+use super::listing::{Entry, LISTING, Listing, SAME_DEGREES, bad};
 use super::names::in_name;
 use super::pairs::degrees_between;
-use super::{Entry, LISTING, Listing, SAME_DEGREES, bad};
 use crate::data::dataset::{Dataset, Sample};
 use crate::data::directions::to_degrees;
 use crate::error::{Result, ToolError};

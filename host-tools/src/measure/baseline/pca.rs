@@ -78,7 +78,7 @@ impl Decoder for Decoded {
                 );
             }
         }
-        self.frame.images(lights, view, &rows, &self.of_texels, rank, out);
+        self.frame.images(lights, view, &rows, &self.of_texels, out);
     }
 
     fn filtered(&self, at: &At) -> [f32; 3] {

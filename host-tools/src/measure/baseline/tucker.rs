@@ -239,7 +239,7 @@ impl Decoder for Decoded {
             .iter()
             .zip(rows.chunks_mut(3 * l))
             .for_each(|(&light, rows)| Decoded::blended(&self.light, 3 * l, light, rows));
-        self.frame.images(lights, view, &rows, &by_view, l, out);
+        self.frame.images(lights, view, &rows, &by_view, out);
     }
 
     fn filtered(&self, at: &At) -> [f32; 3] {

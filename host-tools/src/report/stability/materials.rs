@@ -6,7 +6,8 @@ use crate::data::directions;
 use crate::data::transfer::Domain;
 use crate::encode::goal::{domain_name, rms_of};
 use crate::error::Result;
-use crate::measure::compare::{Source, compare};
+use crate::measure::compare::compare;
+use crate::measure::radiance::AtLevel;
 use crate::methods::{METHODS, Method};
 use std::path::Path;
 
@@ -84,8 +85,7 @@ fn through_a_file(folder: &Path, material: Material, method: &Method, domain: Do
     let (bytes, stated) = encoded(&data, method, domain)?;
     let file = opened(&bytes)?;
     let offset = data.statistics().log_offset();
-    let (reference, decoded) = (Source::Data(&data), Source::File(&file, 0));
-    let metrics = compare(reference, decoded, data.description(), offset, None, &|_, _| ())?;
+    let metrics = compare(&data, &AtLevel::finest(&file), data.description(), offset, None, &|_, _| ())?;
     let largest = data.statistics().largest as f64;
     let range = match domain {
         Domain::Log => ((largest + offset as f64) / offset as f64).ln(),

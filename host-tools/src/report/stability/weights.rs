@@ -3,8 +3,8 @@
 use super::files::{direction, opened, small_file, upward, weight_defect};
 use super::{Case, Outcome, case};
 use crate::data::directions;
+use crate::format::query::query;
 use crate::math::random::Random;
-use crate::measure::compare::query;
 use crate::methods::METHODS;
 use glam::DVec3;
 use selvedge::Direction;

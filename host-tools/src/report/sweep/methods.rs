@@ -3,12 +3,13 @@
 
 use super::swept::{Curve, Made, Shared, Swept, Visitor, What};
 use crate::data::transfer::Domain;
+use crate::data::transfer::transfer_of;
 use crate::encode::ENCODERS;
 use crate::encode::encoder::{self, Common, Encoder, Levels};
 use crate::encode::goal::{Goal, Target, domain_name};
 use crate::error::Result;
 use crate::methods::sparse_ensemble::encode::{self, prepare};
-use crate::methods::sparse_tensor::encode::{ShapeSearch, fit, transfer_of};
+use crate::methods::sparse_tensor::encode::{ShapeSearch, fit};
 use crate::methods::{by_name, sparse_ensemble, sparse_tensor};
 use crate::progress::Quiet;
 use std::time::Instant;
@@ -196,7 +197,7 @@ mod tests {
             let curve = entry.curves(Domain::Log).remove(0);
             assert_eq!((curve.name, curve.colour), (format!("{}, log", method.name), method.colour));
             let mut found = Vec::new();
-            let logged = RefCell::new(Vec::new());
+            let said = RefCell::new(Vec::new());
             let mut visitor = Visitor {
                 wanted: &|_, _| true,
                 visit: &mut |made: Made| {
@@ -205,14 +206,14 @@ mod tests {
                         Ok(())
                     })
                 },
-                log: &|line| logged.borrow_mut().push(line.to_owned()),
+                log: &|line| said.borrow_mut().push(line.to_owned()),
                 memory: &Memory::default(),
             };
             let budgets = [missed, met];
             let mut shared = Shared::new(&data, Domain::Log, 8, &budgets);
             entry.sweep(&mut shared, &mut visitor).expect("swept");
             assert!(found.len() == 1 && found[0].0 == met && found[0].1 <= met, "{found:?}");
-            assert!(logged.borrow().iter().any(|line| line.contains("left out")), "{logged:?}");
+            assert!(said.borrow().iter().any(|line| line.contains("left out")), "{said:?}");
         }
     }
 }

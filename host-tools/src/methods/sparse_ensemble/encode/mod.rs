@@ -17,6 +17,7 @@ pub mod prepare;
 mod records;
 mod search;
 pub mod select;
+pub mod settings;
 pub mod threshold;
 pub mod verified;
 
@@ -25,4 +26,4 @@ pub use prepare::{Prepared, prepare};
 pub use threshold::encode;
 
 /// The encoder with default options.
-pub static ENCODER: encoder::SparseEnsemble = encoder::SparseEnsemble::DEFAULT;
+pub static ENCODER: settings::SparseEnsemble = settings::SparseEnsemble::DEFAULT;

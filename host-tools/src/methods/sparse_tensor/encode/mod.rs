@@ -17,13 +17,12 @@ pub mod options;
 mod ranges;
 pub mod shapes;
 
-pub use crate::data::transfer::transfer_of;
 pub use coder::{encode, encode_fit};
 pub use options::{Encoded, Options};
 pub use shapes::ShapeSearch;
 
 /// The encoder with default options.
-pub static ENCODER: encoder::SparseTensor = encoder::SparseTensor::DEFAULT;
+pub static ENCODER: options::SparseTensor = options::SparseTensor::DEFAULT;
 
 #[cfg(test)]
 mod tests {
@@ -34,7 +33,8 @@ mod tests {
     use crate::encode::goal::Target;
     use crate::math::pca::pca;
     use crate::measure::baseline::tests::small;
-    use crate::measure::compare::{Source, compare};
+    use crate::measure::compare::compare;
+    use crate::measure::radiance::AtLevel;
     use selvedge::Limits;
 
     fn options(target: Target) -> Options {
@@ -46,8 +46,8 @@ mod tests {
     fn decoded(data: &Dataset, bytes: &[u8], domain: Domain) -> f64 {
         let file = selvedge::open(bytes, &Limits::NONE).unwrap_or_else(|finding| panic!("{finding}"));
         let metrics = compare(
-            Source::Data(data),
-            Source::File(&file, 0),
+            data,
+            &AtLevel::finest(&file),
             data.description(),
             data.statistics().log_offset(),
             None,

@@ -4,6 +4,42 @@ use super::fit::{Shape, Trained, Training};
 use crate::encode::goal::Target;
 use crate::format::model::MaterialModel;
 
+/// The encoder with its own options.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SparseTensor {
+    /// Sizes of the dictionaries and lists; chosen if `None`. With [`Goal::AsGiven`](crate::encode::goal::Goal) they are the goal.
+    pub shape: Option<Shape>,
+    /// Components that training works in, at most.
+    pub rank: usize,
+    /// Memory budget of their decomposition, bytes.
+    pub memory: usize,
+    /// How long to train.
+    pub training: Training,
+}
+
+/// Components, where none are asked for.
+pub(super) const RANK: u16 = 200;
+/// Memory budget of the decomposition, where none is asked for, MB.
+pub(super) const MEMORY: u32 = 4000;
+/// Bytes of one MB.
+pub(super) const MB: usize = 1_000_000;
+
+impl Default for SparseTensor {
+    fn default() -> SparseTensor {
+        SparseTensor::DEFAULT
+    }
+}
+
+impl SparseTensor {
+    /// A chosen shape.
+    pub const DEFAULT: SparseTensor = SparseTensor {
+        shape: None,
+        rank: RANK as usize,
+        memory: MEMORY as usize * MB,
+        training: Training::DEFAULT,
+    };
+}
+
 /// How to encode.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
