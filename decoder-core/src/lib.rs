@@ -60,11 +60,11 @@ mod image;
 pub mod kernel;
 pub mod method;
 mod open;
+#[cfg(feature = "batch")]
+mod query;
 mod selvedge;
 pub mod walk;
 
-#[cfg(feature = "batch")]
-pub use batch::FilteredQuery;
 pub use container::header::Header;
 pub use container::metadata::Metadata;
 pub use digest::{DIGEST_QUERIES, next_query_word};
@@ -73,6 +73,8 @@ pub use kernel::colour::{Rgb, Values};
 pub use kernel::direction::{Direction, Located, Taps};
 pub use kernel::material::Material;
 pub use open::{open, open_reporting, open_with, validate};
+#[cfg(feature = "batch")]
+pub use query::FilteredQuery;
 pub use selvedge::{BufferTooSmall, Selvedge, position_from_f32};
 pub use walk::check::Section;
 pub use walk::crc32::crc32;

@@ -2,10 +2,10 @@
 #![deny(clippy::arithmetic_side_effects)]
 
 use crate::container::directions::{check_directions, largest_candidates};
-use crate::container::directory::{
-    DIRECTIONS, EXTERNAL, MEANS, METADATA, SCALES, check_directory, find_section,
-};
-use crate::container::header::{CONTENT_DICTIONARY, CONTENT_MATERIAL, HEADER_LENGTH, Header, check_header};
+use crate::container::directory::{DIRECTIONS, EXTERNAL, MEANS, METADATA, SCALES, find_section};
+use crate::container::directory_checks::check_directory;
+use crate::container::header::{CONTENT_DICTIONARY, CONTENT_MATERIAL, HEADER_LENGTH, Header};
+use crate::container::header_checks::check_header;
 use crate::container::metadata::{check_external, check_metadata};
 use crate::container::pair_table::check_pair_table;
 use crate::error::{Finding, First, Part, Rule, Sink};

@@ -1,6 +1,7 @@
 //! The conformance suite, with nothing but the core: every vector is answered as its manifest states, on
 //! every path.
 
+use selvedge::kernel::interpolation::{radiance, texel_values};
 use selvedge::{
     BufferTooSmall, Direction, FilteredQuery, First, Limits, Part, Rgb, Selvedge, open_with, validate,
 };
@@ -18,14 +19,14 @@ fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Batches and images give what single samples give.
-fn fast_paths_agree(material: &Selvedge<'_>) {
+/// Queries of any words, and at the places where results may go either of two ways.
+fn queries_of(material: &Selvedge<'_>) -> Vec<FilteredQuery> {
     let mut state = 1u32;
     let mut next = || {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         state
     };
-    let queries: Vec<FilteredQuery> = (0..48)
+    let mut queries: Vec<FilteredQuery> = (0..48)
         .map(|_| {
             let mut direction = || Direction {
                 x_q18: (next() >> 13) as i32 - 262_144,
@@ -37,7 +38,6 @@ fn fast_paths_agree(material: &Selvedge<'_>) {
         })
         .collect();
     // On the horizon, and on every sample direction, where a weight is zero.
-    let mut queries = queries;
     for i in 0..8 {
         let (light, view) = (material.light_direction(i), material.view_direction(i));
         queries.push(FilteredQuery { u_q32: next(), v_q32: next(), light, view });
@@ -53,27 +53,35 @@ fn fast_paths_agree(material: &Selvedge<'_>) {
         let (light, view) = (queries[i as usize].light, queries[i as usize].view);
         queries.push(FilteredQuery { u_q32: (i & 3) << 30, v_q32: (i >> 2) << 30, light, view });
     }
+    queries
+}
+
+/// Batches give what single samples give.
+fn batches_agree(material: &Selvedge<'_>, queries: &[FilteredQuery]) {
     let mut scratch = vec![-1; material.batch_scratch_len(queries.len())];
     let mut out = vec![Rgb::default(); queries.len()];
-    material.sample_batch(&queries, &mut scratch, &mut out).expect("buffers fit");
+    material.sample_batch(queries, &mut scratch, &mut out).expect("buffers fit");
     for (query, rgb) in queries.iter().zip(&out) {
         assert_eq!(material.filtered(query.u_q32, query.v_q32, query.light, query.view), *rgb);
     }
     // A result longer than the queries is left alone behind them; a shorter one is refused.
     let mut longer = vec![Rgb { r: 7, g: 7, b: 7 }; queries.len() + 1];
-    material.sample_batch(&queries, &mut scratch, &mut longer).expect("buffers fit");
+    material.sample_batch(queries, &mut scratch, &mut longer).expect("buffers fit");
     assert_eq!((&longer[..queries.len()], longer[queries.len()]), (&out[..], Rgb { r: 7, g: 7, b: 7 }));
     let short = BufferTooSmall { needed: queries.len(), lent: queries.len() - 1 };
-    assert_eq!(material.sample_batch(&queries, &mut scratch, &mut longer[..queries.len() - 1]), Err(short));
+    assert_eq!(material.sample_batch(queries, &mut scratch, &mut longer[..queries.len() - 1]), Err(short));
     assert!(
-        material.sample_batch(&queries, &mut scratch[1..], &mut out).is_err()
+        material.sample_batch(queries, &mut scratch[1..], &mut out).is_err()
             || material.batch_scratch_len(queries.len()) == 0
     );
+}
+
+/// Images and channels give what single texels give; buffers may be longer than needed, and not shorter.
+fn images_agree(material: &Selvedge<'_>, light: Direction, view: Direction) {
     assert_eq!(material.image_size(0), [material.header().width, material.header().height]);
     for level in 0..material.header().level_count {
         let [width, height] = material.image_size(level);
         let texels = (width * height) as usize;
-        let (light, view) = (queries[0].light, queries[0].view);
         let mut scratch = vec![-1; material.image_scratch_len()];
         let mut image = vec![Rgb::default(); texels];
         material.decode_image(level, light, view, &mut scratch, &mut image).expect("buffers fit");
@@ -89,18 +97,8 @@ fn fast_paths_agree(material: &Selvedge<'_>) {
         let (light, view) = (material.locate_light(light), material.locate_view(view));
         for i in (0..texels).step_by(1 + texels / 200).filter(|_| level == 0) {
             let (x, y) = (i as u32 % width, i as u32 / width);
-            let values = selvedge::kernel::interpolation::texel_values(
-                material.words(),
-                material.material(),
-                x,
-                y,
-                &light,
-                &view,
-            );
-            assert_eq!(
-                (selvedge::kernel::interpolation::radiance(material.material(), values, &light), values.c0),
-                (image[i], channel[i])
-            );
+            let values = texel_values(material.words(), material.material(), x, y, &light, &view);
+            assert_eq!((radiance(material.material(), values, &light), values.c0), (image[i], channel[i]));
         }
     }
 }
@@ -280,7 +278,9 @@ fn the_suite_is_answered_as_stated() {
             assert_eq!(first.0, None, "{}", columns[1]);
             if let Ok(material) = &opened {
                 assert_eq!(hex(&material.decode_digest()), columns[3], "{}", columns[1]);
-                fast_paths_agree(material);
+                let queries = queries_of(material);
+                batches_agree(material, &queries);
+                images_agree(material, queries[0].light, queries[0].view);
                 sample_directions_are_found(material);
                 let found = points_are_clamped_to_the_hull(material, 200);
                 (inside, beyond) = (inside + found[0], beyond + found[1]);

@@ -198,14 +198,11 @@ const FLAT: &str = "
 }
 ";
 
-/// Seconds that a kernel takes for the queries, and its answers.
-fn on_gpu(
-    device: &wgpu::Device,
-    queue: &wgpu::Queue,
-    case: &Case,
-    queries: &[Query],
-    body: &str,
-) -> (f64, Vec<i32>) {
+/// A device and its queue.
+type Gpu = (wgpu::Device, wgpu::Queue);
+
+/// The pipeline of a kernel: a whole one, or a term of the grouped sums.
+fn pipeline_of(device: &wgpu::Device, body: &str) -> wgpu::ComputePipeline {
     let source = if body.contains("@compute") {
         format!("{COMMON}{body}")
     } else {
@@ -215,15 +212,18 @@ fn on_gpu(
         label: None,
         source: wgpu::ShaderSource::Wgsl(source.into()),
     });
-    let descriptor = wgpu::ComputePipelineDescriptor {
+    device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
         label: None,
         layout: None,
         module: &module,
         entry_point: None,
         compilation_options: Default::default(),
         cache: None,
-    };
-    let pipeline = device.create_compute_pipeline(&descriptor);
+    })
+}
+
+/// Buffers of the terms, the tables and the queries of a case.
+fn inputs_of(device: &wgpu::Device, case: &Case, queries: &[Query]) -> [wgpu::Buffer; 3] {
     let terms: Vec<i32> = case
         .terms
         .iter()
@@ -240,26 +240,31 @@ fn on_gpu(
         let usage = wgpu::BufferUsages::STORAGE;
         device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: None, contents, usage })
     };
+    [
+        make(bytemuck::cast_slice(&terms)),
+        make(bytemuck::cast_slice(&tables)),
+        make(bytemuck::cast_slice(&words)),
+    ]
+}
+
+/// Seconds that a kernel takes for the queries, and its answers.
+fn on_gpu((device, queue): &Gpu, case: &Case, queries: &[Query], body: &str) -> (f64, Vec<i32>) {
+    let pipeline = pipeline_of(device, body);
     let size = (queries.len() * 4) as u64;
     let buffer = |usage| {
         device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false })
     };
+    let [terms, tables, words] = inputs_of(device, case, queries);
     let answers = buffer(wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
     let back = buffer(wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ);
-    let inputs = [
-        make(bytemuck::cast_slice(&terms)),
-        make(bytemuck::cast_slice(&tables)),
-        make(bytemuck::cast_slice(&words)),
-        answers.clone(),
-    ];
+    let bound = [&terms, &tables, &words, &answers];
     let entries: Vec<wgpu::BindGroupEntry<'_>> = (0u32..)
-        .zip(&inputs)
+        .zip(bound)
         .map(|(binding, b)| wgpu::BindGroupEntry { binding, resource: b.as_entire_binding() })
         .collect();
-    let layout = pipeline.get_bind_group_layout(0);
     let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: None,
-        layout: &layout,
+        layout: &pipeline.get_bind_group_layout(0),
         entries: &entries,
     });
     let mut best = f64::MAX;
@@ -286,6 +291,46 @@ fn on_gpu(
     (best, bytemuck::cast_slice(&view).to_vec())
 }
 
+/// Random queries of the tables.
+fn random_queries() -> Vec<Query> {
+    let mut random = Random::new(1);
+    let mut rows = |most: i64| random.range(0, most) as usize;
+    (0..1 << 16).map(|_| [rows(150), rows(150), rows(9), rows(9)]).collect()
+}
+
+/// Signal to noise of an order against binary64, from units of 2^-15, decibels.
+fn signal_to_noise(case: &Case, order: Order, blended: &[Blended], queries: &[Query]) -> f64 {
+    let (mut signal, mut noise) = (0.0, 0.0);
+    for (b, q) in blended.iter().zip(queries.chunks(LANES)) {
+        for (lane, got) in order(case, b).iter().enumerate() {
+            let wanted = exact(case, q[lane]);
+            signal += wanted * wanted;
+            noise += (*got as f64 - wanted).powi(2);
+        }
+    }
+    10.0 * f64::log10(signal / noise)
+}
+
+/// Queries of which columns are blended beforehand.
+const BLENDED: usize = 512;
+
+/// Queries a second of an order on one core, in lanes: the median.
+fn cpu_rate(case: &Case, order: Order, blended: &[Blended]) -> f64 {
+    let mut rates: Vec<f64> = (0..15)
+        .map(|_| {
+            let begin = Instant::now();
+            for _ in 0..40 {
+                blended.iter().for_each(|b| {
+                    black_box(order(black_box(case), b));
+                });
+            }
+            40.0 * BLENDED as f64 / begin.elapsed().as_secs_f64()
+        })
+        .collect();
+    rates.sort_by(f64::total_cmp);
+    rates[7]
+}
+
 fn main() {
     if std::env::args().any(|argument| argument == "--test") {
         return;
@@ -303,51 +348,22 @@ fn main() {
     println!("target features: avx2 {}", cfg!(target_feature = "avx2"));
     for (count, atoms) in [(64, 6), (256, 59)] {
         let case = case(count, atoms);
-        let mut random = Random::new(1);
-        let queries: Vec<Query> = (0..1 << 16)
-            .map(|_| {
-                [
-                    random.range(0, 150) as usize,
-                    random.range(0, 150) as usize,
-                    random.range(0, 9) as usize,
-                    random.range(0, 9) as usize,
-                ]
-            })
-            .collect();
-        let blended: Vec<Blended> = queries[..512].chunks(LANES).map(|q| blend(&case, q)).collect();
+        let queries = random_queries();
+        let blended: Vec<Blended> = queries[..BLENDED].chunks(LANES).map(|q| blend(&case, q)).collect();
         for (name, order, kernel) in ORDERS {
-            // Answers first: signal to noise against binary64, from units of 2^-15.
-            let (mut signal, mut noise) = (0.0, 0.0);
-            for (b, q) in blended.iter().zip(queries.chunks(LANES)) {
-                for (lane, got) in order(&case, b).iter().enumerate() {
-                    let wanted = exact(&case, q[lane]);
-                    signal += wanted * wanted;
-                    noise += (*got as f64 - wanted).powi(2);
-                }
-            }
-            let mut rates: Vec<f64> = (0..15)
-                .map(|_| {
-                    let begin = Instant::now();
-                    for _ in 0..40 {
-                        blended.iter().for_each(|b| {
-                            black_box(order(black_box(&case), b));
-                        });
-                    }
-                    40.0 * 512.0 / begin.elapsed().as_secs_f64()
-                })
-                .collect();
-            rates.sort_by(f64::total_cmp);
-            let gpu_rate = gpu.as_ref().map(|(device, queue)| {
-                let (seconds, answers) = on_gpu(device, queue, &case, &queries, kernel);
+            let quality = signal_to_noise(&case, order, &blended, &queries);
+            let rate = cpu_rate(&case, order, &blended);
+            let gpu_rate = gpu.as_ref().map(|gpu| {
+                let (seconds, answers) = on_gpu(gpu, &case, &queries, kernel);
                 for (b, (q, a)) in blended.iter().zip(queries.chunks(LANES).zip(answers.chunks(LANES))) {
                     assert_eq!(order(&case, b).as_slice(), a, "{name} {:?}", q[0]);
                 }
                 queries.len() as f64 / seconds / 1e6
             });
             println!(
-                "{count:4} coefficients  {name:7} {:6.1} dB  CPU, 8 lanes {:6.2} M sums/s  kernel {:6.2} M/s",
-                10.0 * (signal / noise).log10(),
-                rates[7] / 1e6,
+                "{count:4} coefficients  {name:7} {quality:6.1} dB  CPU, 8 lanes {:6.2} M sums/s  \
+                 kernel {:6.2} M/s",
+                rate / 1e6,
                 gpu_rate.unwrap_or(f64::NAN)
             );
         }

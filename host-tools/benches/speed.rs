@@ -4,7 +4,8 @@
 //!
 //! With `SELVEDGE_DATA` the full 400 x 400 material is measured, without it the excerpt in the repository.
 
-use selvedge::{Direction, FilteredQuery, Limits, Rgb};
+use selvedge::kernel::interpolation::texel_values;
+use selvedge::{Direction, FilteredQuery, Limits, Rgb, Selvedge};
 use selvedge_tools::data::dataset::{Dataset, Sample};
 use selvedge_tools::format::model::{MaterialModel, TransferModel};
 use selvedge_tools::format::write;
@@ -93,8 +94,8 @@ fn mean_operations(model: &MaterialModel) -> [f64; 2] {
     [sample / blocks * (1.0 + 1.0 / edge).powi(2), image / blocks / channels / (edge * edge) + 2.0]
 }
 
-/// Filtered RGB samples of an encoded material whose samples meet so many coefficients of each channel in the
-/// mean.
+/// Filtered RGB samples of an encoded material whose samples meet `met` coefficients of each channel on
+/// average.
 fn encoded(folder: &Path, met: [usize; 3]) {
     const EDGE: usize = 16;
     let path = folder.join("cloth.selvset");
@@ -143,32 +144,11 @@ fn encoded(folder: &Path, met: [usize; 3]) {
     }
 }
 
-fn main() {
-    // Cargo passes --bench; run as a test, there is nothing to do.
-    if std::env::args().any(|argument| argument == "--test") {
-        return;
-    }
-    let (folder, size) = match std::env::var_os("SELVEDGE_DATA") {
-        Some(data) => (PathBuf::from(data).join("sparsebtf"), None),
-        None => (Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/sparsebtf"), None),
-    };
-    println!("target features: avx2 {}, data {}", cfg!(target_feature = "avx2"), folder.display());
-    let temporary = tempfile::tempdir().expect("a folder");
-    encoded(temporary.path(), [256, 64, 64]);
-    encoded(temporary.path(), [64, 16, 16]);
-    let authors = sparsebtf::read_material(&folder, "carpet07", size).expect("data");
-    let bytes = write::write_material(&authors.to_model(10).expect("model"));
-    let material = selvedge::open(&bytes, &Limits::default()).expect("legal");
-    let [sample, texel] = mean_operations(&authors.to_model(10).expect("model"));
-    println!("{} bytes, {} operations a filtered sample at worst", bytes.len(), material.header().operations);
-    println!(
-        "in the mean {sample:.0} operations for the records of a filtered sample, {texel:.1} for a channel texel of an image"
-    );
-
-    let queries = queries(7);
+/// Random filtered samples, one by one and in batches, after both were compared.
+fn samples(material: &Selvedge<'_>, queries: &[FilteredQuery]) {
     let mut scratch = vec![0; material.batch_scratch_len(queries.len())];
     let mut out = vec![Rgb::default(); queries.len()];
-    material.sample_batch(&queries, &mut scratch, &mut out).expect("buffers fit");
+    material.sample_batch(queries, &mut scratch, &mut out).expect("buffers fit");
     let plain = |query: &FilteredQuery| material.filtered(query.u_q32, query.v_q32, query.light, query.view);
     for (query, rgb) in queries.iter().zip(&out) {
         assert_eq!(plain(query), *rgb, "the batch is not the plain path");
@@ -196,37 +176,42 @@ fn main() {
     println!(
         "two directions located                         {}",
         rate(count, || {
-            for query in &queries {
+            for query in queries {
                 black_box((material.locate_light(query.light), material.locate_view(query.view)));
             }
         })
     );
+}
 
+/// Channels that whole images are decoded of: those after the first.
+const IMAGE_CHANNELS: [usize; 2] = [1, 2];
+
+/// Asserts that a decoded channel has the values of the plain path.
+fn assert_plain(material: &Selvedge<'_>, pair: [Direction; 2], channel: usize, values: &[i32]) {
+    let width = material.image_size(0)[0];
+    let (light, view) = (material.locate_light(pair[0]), material.locate_view(pair[1]));
+    let (words, m) = (material.words(), material.material());
+    for (i, value) in values.iter().enumerate() {
+        let (x, y) = (i as u32 % width, i as u32 / width);
+        let whole = texel_values(words, m, x, y, &light, &view);
+        assert_eq!([whole.c0, whole.c1, whole.c2][channel], *value, "the image is not the plain path");
+    }
+}
+
+/// Whole images of a pair of light and view, after they were compared with the plain path.
+fn images(material: &Selvedge<'_>, [light, view]: [Direction; 2]) {
     let [width, height] = material.image_size(0);
     let texels = (width * height) as usize;
     let mut scratch = vec![0; material.image_scratch_len()];
     let mut values = vec![0; texels];
-    let (light, view) = (queries[0].light, queries[0].view);
-    let taps = (material.locate_light(light), material.locate_view(view));
-    for channel in [1, 2] {
+    for channel in IMAGE_CHANNELS {
         material.decode_channel(channel, 0, light, view, &mut scratch, &mut values).expect("buffers fit");
-        for (i, value) in values.iter().enumerate() {
-            let (x, y) = (i as u32 % width, i as u32 / width);
-            let whole = selvedge::kernel::interpolation::texel_values(
-                material.words(),
-                material.material(),
-                x,
-                y,
-                &taps.0,
-                &taps.1,
-            );
-            assert_eq!([whole.c0, whole.c1, whole.c2][channel], *value, "the image is not the plain path");
-        }
+        assert_plain(material, [light, view], channel, &values);
     }
     println!(
         "whole image, channel texels (two channels)     {}",
         rate(2.0 * texels as f64, || {
-            for channel in [1, 2] {
+            for channel in IMAGE_CHANNELS {
                 material
                     .decode_channel(channel, 0, light, view, &mut scratch, &mut values)
                     .expect("buffers fit");
@@ -242,9 +227,10 @@ fn main() {
             black_box(&image);
         })
     );
+}
 
-    // A file of about 5 MB: the same records over a taller image.
-    let mut model = authors.to_model(10).expect("model");
+/// Opens a file of about 5 MB: the records of a model over a taller image.
+fn opening(mut model: MaterialModel) {
     let repeat = (5_000_000 / 400_000).min(16_000 / model.size[1]);
     model.size[1] *= repeat;
     for ensemble in ensembles_mut(&mut model) {
@@ -259,4 +245,33 @@ fn main() {
     });
     println!("open, bytes of a file of {} bytes          {}", large.len(), open);
     println!("  so a file of 5,000,000 bytes of this kind opens in 5 s / (M/s)");
+}
+
+fn main() {
+    // Cargo passes --bench; run as a test, there is nothing to do.
+    if std::env::args().any(|argument| argument == "--test") {
+        return;
+    }
+    let (folder, size) = match std::env::var_os("SELVEDGE_DATA") {
+        Some(data) => (PathBuf::from(data).join("sparsebtf"), None),
+        None => (Path::new(env!("CARGO_MANIFEST_DIR")).join("data/sparsebtf"), None),
+    };
+    println!("target features: avx2 {}, data {}", cfg!(target_feature = "avx2"), folder.display());
+    let temporary = tempfile::tempdir().expect("a folder");
+    encoded(temporary.path(), [256, 64, 64]);
+    encoded(temporary.path(), [64, 16, 16]);
+    let authors = sparsebtf::read_material(&folder, "carpet07", size).expect("data");
+    let model = authors.to_model(10).expect("model");
+    let bytes = write::write_material(&model);
+    let material = selvedge::open(&bytes, &Limits::default()).expect("legal");
+    let [sample, texel] = mean_operations(&model);
+    println!("{} bytes, {} operations a filtered sample at worst", bytes.len(), material.header().operations);
+    println!(
+        "in the mean {sample:.0} operations for the records of a filtered sample, \
+         {texel:.1} for a channel texel of an image"
+    );
+    let queries = queries(7);
+    samples(&material, &queries);
+    images(&material, [queries[0].light, queries[0].view]);
+    opening(model);
 }

@@ -9,16 +9,16 @@
 
 use selvedge::kernel::position::{Place, axis_at_position};
 use selvedge::method::sparse_tensor::sparse_tensor_textures_q20;
-use selvedge::{Direction, FilteredQuery, Limits, Located, Rgb, Taps};
+use selvedge::{Direction, FilteredQuery, Limits, Located, Rgb, Selvedge, Taps};
 use selvedge_tools::data::dataset::{Dataset, Sample};
 use selvedge_tools::encode::goal::Target;
 use selvedge_tools::format::model::MaterialModel;
 use selvedge_tools::math::random::Random;
-use selvedge_tools::measure::baseline::pca::{Domain, pca};
 use selvedge_tools::methods::sparse_tensor::encode::fit::{Shape, Training};
 use selvedge_tools::methods::sparse_tensor::encode::{Options, encode};
 use selvedge_tools::methods::sparse_tensor::model::tensor_of;
 use selvedge_tools::synth::{Mesostructure, Request, synthesise};
+use selvedge_tools::{data::transfer::Domain, math::pca::pca};
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -147,6 +147,106 @@ fn line(name: &str, rates: &mut [f64]) -> f64 {
     rates[RUNS / 2]
 }
 
+/// A material, the same in binary32, and random queries with their located light and view.
+struct Bench<'a> {
+    model: &'a MaterialModel,
+    material: &'a Selvedge<'a>,
+    floats: Floats,
+    queries: Vec<FilteredQuery>,
+    located: Vec<(Located, Located)>,
+}
+
+impl<'a> Bench<'a> {
+    fn new(model: &'a MaterialModel, material: &'a Selvedge<'a>) -> Bench<'a> {
+        let mut random = Random::new(9);
+        let queries: Vec<FilteredQuery> = (0..QUERIES)
+            .map(|_| FilteredQuery {
+                u_q32: random.word(),
+                v_q32: random.word(),
+                light: direction(&mut random),
+                view: direction(&mut random),
+            })
+            .collect();
+        let located =
+            queries.iter().map(|q| (material.locate_light(q.light), material.locate_view(q.view))).collect();
+        Bench { model, material, floats: Floats::new(model), queries, located }
+    }
+
+    /// Axes of a query's position.
+    fn place(&self, query: &FilteredQuery) -> Place {
+        let m = self.material.material();
+        let axis = |position: u32| axis_at_position(m.edge, m.edge_reciprocal_q18, m.width, position);
+        Place { level: 0, x: axis(query.u_q32), y: axis(query.v_q32) }
+    }
+
+    /// How many ABRDF atoms the texels of a sample have.
+    fn atoms_met(&self, place: &Place) -> usize {
+        let lists = &tensor_of(self.model).expect("a tensor").lists[0][0].lists;
+        let mut atoms = std::collections::BTreeSet::new();
+        for y in [place.y.first.block, place.y.second.block] {
+            for x in [place.x.first.block, place.x.second.block] {
+                atoms.extend(lists[(y * self.material.material().width + x) as usize].iter().map(|c| c.0));
+            }
+        }
+        atoms.len()
+    }
+
+    /// Asserts that the batch has the words of the plain path, and the taps the same but for rounding. Gives
+    /// the largest difference, the largest texture, and ABRDF atoms of all samples.
+    fn compare(&self, out: &[Rgb]) -> (f64, f64, usize) {
+        let (material, mut worst, mut largest, mut met) = (self.material, 0.0f64, 0.0f64, 0usize);
+        for ((query, rgb), &(light, view)) in self.queries.iter().zip(out).zip(&self.located) {
+            assert_eq!(
+                material.filtered(query.u_q32, query.v_q32, query.light, query.view),
+                *rgb,
+                "the batch is not the plain path"
+            );
+            let wanted = self.floats.filtered(query, light.taps, view.taps);
+            let place = self.place(query);
+            let got =
+                sparse_tensor_textures_q20(material.words(), material.material(), &place, &light, &view);
+            for (got, wanted) in [got.c0, got.c1, got.c2].into_iter().zip(wanted) {
+                worst = worst.max((got as f64 / 1_048_576.0 - wanted as f64).abs());
+                largest = largest.max(wanted.abs() as f64);
+            }
+            met += self.atoms_met(&place);
+        }
+        (worst, largest, met)
+    }
+
+    /// Times the batch, the plain path and the taps in turn.
+    fn time(&self, scratch: &mut [i32], out: &mut [Rgb]) {
+        let (material, queries) = (self.material, &self.queries);
+        let mut rates = [(); 3].map(|()| Vec::new());
+        for _ in 0..RUNS {
+            let mut timed = |which: usize, run: &mut dyn FnMut()| {
+                let begin = Instant::now();
+                run();
+                rates[which].push(queries.len() as f64 / begin.elapsed().as_secs_f64());
+            };
+            timed(0, &mut || material.sample_batch(queries, scratch, out).expect("buffers fit"));
+            black_box(&*out);
+            timed(1, &mut || {
+                let plain = |q: &FilteredQuery| material.filtered(q.u_q32, q.v_q32, q.light, q.view);
+                queries.iter().for_each(|q| _ = black_box(plain(q)))
+            });
+            timed(2, &mut || {
+                let taps =
+                    |q, light: &Located, view: &Located| self.floats.filtered(q, light.taps, view.taps);
+                let all = queries.iter().zip(&self.located);
+                all.for_each(|(q, (light, view))| _ = black_box(taps(q, light, view)))
+            });
+        }
+        let [batch, plain, taps] = &mut rates;
+        let (batch, plain, taps) = (
+            line("merged list, batch", batch),
+            line("merged list, one by one", plain),
+            line("36 separate taps in binary32", taps),
+        );
+        println!("batch {:.2} times the taps, one by one {:.2} times", batch / taps, plain / taps);
+    }
+}
+
 fn measure(data: &Dataset, light_atoms: usize, abrdf_atoms: usize) {
     let components = pca(data, Domain::Linear, 160).expect("data");
     let shape = Shape { light_atoms, abrdf_atoms, entries: 9, coefficients: 11 };
@@ -154,83 +254,20 @@ fn measure(data: &Dataset, light_atoms: usize, abrdf_atoms: usize) {
     let options = Options { shape, target: Target::AsGiven, value_bits: Some(7), training };
     let encoded = encode(&components, &[], &options, |_, _, _| ()).expect("encoded");
     let material = selvedge::open(&encoded.bytes, &Limits::NONE).expect("legal");
-    let floats = Floats::new(&encoded.model);
-    let mut random = Random::new(9);
-    let queries: Vec<FilteredQuery> = (0..QUERIES)
-        .map(|_| FilteredQuery {
-            u_q32: random.word(),
-            v_q32: random.word(),
-            light: direction(&mut random),
-            view: direction(&mut random),
-        })
-        .collect();
-    let located: Vec<(Located, Located)> =
-        queries.iter().map(|q| (material.locate_light(q.light), material.locate_view(q.view))).collect();
-
-    // Both give the same but for rounding, and the batch the words of the plain path.
-    let mut scratch = vec![0; material.batch_scratch_len(queries.len())];
-    let mut out = vec![Rgb::default(); queries.len()];
-    material.sample_batch(&queries, &mut scratch, &mut out).expect("buffers fit");
-    let (mut worst, mut largest, mut met) = (0.0f64, 0.0f64, 0usize);
-    for ((query, rgb), &(light, view)) in queries.iter().zip(&out).zip(&located) {
-        assert_eq!(
-            material.filtered(query.u_q32, query.v_q32, query.light, query.view),
-            *rgb,
-            "the batch is not the plain path"
-        );
-        let (words, m) = (material.words(), material.material());
-        let axis = |position: u32| axis_at_position(m.edge, m.edge_reciprocal_q18, m.width, position);
-        let wanted = floats.filtered(query, light.taps, view.taps);
-        let place = Place { level: 0, x: axis(query.u_q32), y: axis(query.v_q32) };
-        let got = sparse_tensor_textures_q20(words, m, &place, &light, &view);
-        for (got, wanted) in [got.c0, got.c1, got.c2].into_iter().zip(wanted) {
-            worst = worst.max((got as f64 / 1_048_576.0 - wanted as f64).abs());
-            largest = largest.max(wanted.abs() as f64);
-        }
-        let mut atoms = std::collections::BTreeSet::new();
-        for axis_y in [axis(query.v_q32).first.block, axis(query.v_q32).second.block] {
-            for axis_x in [axis(query.u_q32).first.block, axis(query.u_q32).second.block] {
-                let tensor = tensor_of(&encoded.model).expect("a tensor");
-                atoms.extend(
-                    tensor.lists[0][0].lists[(axis_y * m.width + axis_x) as usize].iter().map(|c| c.0),
-                );
-            }
-        }
-        met += atoms.len();
-    }
+    let bench = Bench::new(&encoded.model, &material);
+    let count = bench.queries.len();
+    let mut scratch = vec![0; material.batch_scratch_len(count)];
+    let mut out = vec![Rgb::default(); count];
+    material.sample_batch(&bench.queries, &mut scratch, &mut out).expect("buffers fit");
+    let (worst, largest, met) = bench.compare(&out);
     println!(
-        "{light_atoms} light atoms, {abrdf_atoms} ABRDF atoms, k1 9, k2 11; {} bytes; {:.1} ABRDF atoms a sample; textures up to {largest:.3}, largest difference {worst:.6}",
+        "{light_atoms} light atoms, {abrdf_atoms} ABRDF atoms, k1 9, k2 11; {} bytes; {:.1} ABRDF atoms a \
+         sample; textures up to {largest:.3}, largest difference {worst:.6}",
         encoded.bytes.len(),
-        met as f64 / queries.len() as f64
+        met as f64 / count as f64
     );
     assert!(worst < 1e-3 * largest, "{worst} of {largest}");
-
-    let mut rates = [(); 3].map(|()| Vec::new());
-    for _ in 0..RUNS {
-        let mut timed = |which: usize, run: &mut dyn FnMut()| {
-            let begin = Instant::now();
-            run();
-            rates[which].push(queries.len() as f64 / begin.elapsed().as_secs_f64());
-        };
-        timed(0, &mut || material.sample_batch(&queries, &mut scratch, &mut out).expect("buffers fit"));
-        black_box(&out);
-        timed(1, &mut || {
-            queries.iter().for_each(|q| _ = black_box(material.filtered(q.u_q32, q.v_q32, q.light, q.view)))
-        });
-        timed(2, &mut || {
-            queries
-                .iter()
-                .zip(&located)
-                .for_each(|(q, &(light, view))| _ = black_box(floats.filtered(q, light.taps, view.taps)))
-        });
-    }
-    let [batch, plain, taps] = &mut rates;
-    let (batch, plain, taps) = (
-        line("merged list, batch", batch),
-        line("merged list, one by one", plain),
-        line("36 separate taps in binary32", taps),
-    );
-    println!("batch {:.2} times the taps, one by one {:.2} times", batch / taps, plain / taps);
+    bench.time(&mut scratch, &mut out);
 }
 
 fn main() {

@@ -56,6 +56,14 @@ pub enum ToolError {
     /// The kernel could not be translated or run.
     #[error("kernel: {0}")]
     Kernel(String),
+    /// What is asked for needs a feature of the crate that this build is without.
+    #[error("{what}: this build is without the feature `{feature}`")]
+    Feature {
+        /// The command, the file or the option.
+        what: String,
+        /// Name of the feature.
+        feature: &'static str,
+    },
     /// A check that the tool makes of its own results failed.
     #[error("{0}")]
     Mismatch(String),
@@ -65,6 +73,11 @@ impl ToolError {
     /// From an I/O error at a path.
     pub fn io(path: &Path) -> impl FnOnce(std::io::Error) -> ToolError + '_ {
         move |source| ToolError::Io { path: path.to_owned(), source }
+    }
+
+    /// That `what` needs a feature which this build is without.
+    pub fn lacking(what: &str, feature: &'static str) -> ToolError {
+        ToolError::Feature { what: what.to_owned(), feature }
     }
 
     /// The program's exit code: 1 usage or a goal out of reach, 2 I/O, 3 invalid, 4 over limits,
@@ -77,7 +90,7 @@ impl ToolError {
             | ToolError::Picture { .. }
             | ToolError::Mismatch(_)
             | ToolError::Different(_) => 3,
-            ToolError::Kernel(_) => 5,
+            ToolError::Kernel(_) | ToolError::Feature { .. } => 5,
             ToolError::Invalid { finding, .. } => exit_code_of(finding.rule),
         }
     }

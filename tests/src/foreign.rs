@@ -1,4 +1,4 @@
-//! Files of others, written for the tests from the layouts that are known of them, and what must be read from
+//! Third-party files, written for the tests from the layouts that are known of them, and what must be read from
 //! them.
 //!
 //! Nothing here is shared with the readers of `selvedge_tools::foreign`: numbers are rounded as the file has

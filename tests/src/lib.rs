@@ -1,4 +1,4 @@
-//! What several tests share: where the data are, loud words for what is skipped, files of others, and the
+//! What several tests share: where the data are, loud messages about what is skipped, third-party files, and the
 //! bodies of the fuzz targets.
 
 pub mod foreign;
@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 /// The excerpt in the repository.
 pub fn excerpt_folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("data/sparsebtf")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../host-tools/data/sparsebtf")
 }
 
 /// The file that is imported from it.
@@ -25,6 +25,39 @@ pub fn full_data_folder(what_is_skipped: &str) -> Option<PathBuf> {
         eprintln!("SKIPPED: {what_is_skipped}: SELVEDGE_DATA DOES NOT NAME A FOLDER WITH sparsebtf/ IN IT");
     }
     folder
+}
+
+/// The chapters of the methods by their numbers: the name of the method, and its text.
+///
+/// The number is in the first line, such as `# 10 Sparse ensemble`.
+pub fn method_chapters() -> Vec<(String, String)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../spec/methods");
+    let listed = std::fs::read_dir(&folder).expect("spec/methods");
+    let mut chapters: Vec<(u32, String, String)> = listed
+        .map(|entry| {
+            let path = entry.expect("an entry").path();
+            let text = std::fs::read_to_string(&path).expect("a method's chapter");
+            let number = text.strip_prefix("# ").and_then(|rest| rest.split(' ').next()?.parse().ok());
+            let name = path.file_stem().expect("a name").to_string_lossy().into_owned();
+            (number.unwrap_or_else(|| panic!("{name}: no chapter number")), name, text)
+        })
+        .collect();
+    chapters.sort();
+    assert!(chapters.windows(2).all(|pair| pair[0].0 < pair[1].0), "a chapter number is used twice");
+    chapters.into_iter().map(|(_, name, text)| (name, text)).collect()
+}
+
+/// The conformance table: that of the shared chapters, then those of the methods' chapters by their numbers.
+pub fn conformance_table() -> String {
+    let spec = Path::new(env!("CARGO_MANIFEST_DIR")).join("../spec");
+    let read = |path: PathBuf| {
+        std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+    };
+    let mut table = read(spec.join("conformance.md"));
+    for (name, _) in method_chapters() {
+        table += &read(spec.join("conformance").join(name + ".md"));
+    }
+    table
 }
 
 /// A number from the environment, for longer runs.

@@ -4,6 +4,7 @@
 //! replay seeds and regressions.
 
 use selvedge::FilteredQuery;
+use selvedge::kernel::interpolation::{filtered_values, radiance, texel_values};
 use selvedge::{Direction, Finding, First, Limits, Part, Rgb, Selvedge};
 use selvedge_tools::check::count;
 use selvedge_tools::check::vectors::{Answer, Vector};
@@ -32,7 +33,7 @@ pub struct Target {
     pub name: &'static str,
     /// What it does with any bytes.
     pub run: fn(&[u8]),
-    /// Bytes of heap that it may take beyond twice the input, if that is bounded: for the files of others.
+    /// Bytes of heap that it may take beyond twice the input, if that is bounded: for third-party files.
     pub memory: Option<usize>,
 }
 
@@ -126,6 +127,33 @@ pub fn open_and_sample(file: &[u8], dictionary: Option<&[u8]>) -> bool {
 fn sample_all_paths(material: &Selvedge<'_>, seed: u64) {
     let random = &mut Random::new(seed);
     let header = *material.header();
+    samples_agree(material, random);
+    material.trilinear(
+        random.word() >> 12,
+        random.word(),
+        random.word(),
+        direction(random),
+        direction(random),
+    );
+    material.point(random.word(), random.word() >> 22, random.word(), random.word() >> 22);
+    images_agree(material, random);
+    floats(random);
+    // In a buffer of several files every word moves by the same number, the dictionary's by its own.
+    let (here, there) = (material.material_at(0, 0), material.material_at(16, 1 << 20));
+    assert_eq!(
+        (there.file_start, there.light_start, there.channels[0].state),
+        (16, here.light_start + 16, here.channels[0].state)
+    );
+    let metadata = material.metadata();
+    assert!(
+        metadata.name.len() + metadata.origin.len() + metadata.licence.len() <= header.file_length as usize
+    );
+    assert!(material.sections().all(|s| s.offset as u64 + s.length as u64 <= header.file_length as u64));
+}
+
+/// Batches, single samples and the count of their cost agree, within the stated cost.
+fn samples_agree(material: &Selvedge<'_>, random: &mut Random) {
+    let header = material.header();
     let queries: Vec<FilteredQuery> = (0..3)
         .map(|_| FilteredQuery {
             u_q32: random.word(),
@@ -149,80 +177,45 @@ fn sample_all_paths(material: &Selvedge<'_>, seed: u64) {
             header.operations
         );
         let (light, view) = (material.locate_light(query.light), material.locate_view(query.view));
-        let values = selvedge::kernel::interpolation::filtered_values(
-            material.words(),
-            material.material(),
-            level,
-            query.u_q32,
-            query.v_q32,
-            &light,
-            &view,
-        );
+        let (words, m) = (material.words(), material.material());
+        let values = filtered_values(words, m, level, query.u_q32, query.v_q32, &light, &view);
         assert_eq!(
             counted.values,
             [values.c0, values.c1, values.c2],
             "the count walks another way than the decoder"
         );
         let whole = material.trilinear(level << 16, query.u_q32, query.v_q32, query.light, query.view);
-        assert_eq!(selvedge::kernel::interpolation::radiance(material.material(), values, &light), whole);
+        assert_eq!(radiance(m, values, &light), whole);
     }
-    material.trilinear(
-        random.word() >> 12,
-        random.word(),
-        random.word(),
-        direction(random),
-        direction(random),
-    );
-    material.point(random.word(), random.word() >> 22, random.word(), random.word() >> 22);
+}
+
+/// Images and channels agree with single texels, if the image is small.
+fn images_agree(material: &Selvedge<'_>, random: &mut Random) {
     let [width, height] = material.image_size(0);
-    if width as usize * height as usize <= 1024 {
-        let (light, view) = (direction(random), direction(random));
-        let mut scratch = vec![-1; material.image_scratch_len()];
-        let mut image = vec![Rgb::default(); (width * height) as usize];
-        material.decode_image(0, light, view, &mut scratch, &mut image).expect("buffers fit");
-        let mut channels = vec![vec![0; image.len()]; 3];
-        for (c, channel) in channels.iter_mut().enumerate() {
-            material.decode_channel(c, 0, light, view, &mut scratch, channel).expect("buffers fit");
-            let short = channel.len() - 1;
-            let error = material
-                .decode_channel(c, 0, light, view, &mut scratch, &mut channel[..short])
-                .expect_err("one texel too few");
-            assert_eq!((error.needed, error.lent), (short + 1, short));
-        }
-        let (light, view) = (material.locate_light(light), material.locate_view(view));
-        for _ in 0..4 {
-            let (x, y) = (random.word() % width, random.word() % height);
-            let values = selvedge::kernel::interpolation::texel_values(
-                material.words(),
-                material.material(),
-                x,
-                y,
-                &light,
-                &view,
-            );
-            let at = (y * width + x) as usize;
-            assert_eq!(
-                selvedge::kernel::interpolation::radiance(material.material(), values, &light),
-                image[at]
-            );
-            assert_eq!(
-                [values.c0, values.c1, values.c2],
-                [channels[0][at], channels[1][at], channels[2][at]]
-            );
-        }
+    if width as usize * height as usize > 1024 {
+        return;
     }
-    floats(random);
-    // In a buffer of several files every word moves by the same number, the dictionary's by its own.
-    let (here, there) = (material.material_at(0, 0), material.material_at(16, 1 << 20));
-    assert_eq!(
-        (there.file_start, there.light_start, there.channels[0].state),
-        (16, here.light_start + 16, here.channels[0].state)
-    );
-    let metadata = material.metadata();
-    assert!(
-        metadata.name.len() + metadata.origin.len() + metadata.licence.len() <= header.file_length as usize
-    );
-    assert!(material.sections().all(|s| s.offset as u64 + s.length as u64 <= header.file_length as u64));
+    let (light, view) = (direction(random), direction(random));
+    let mut scratch = vec![-1; material.image_scratch_len()];
+    let mut image = vec![Rgb::default(); (width * height) as usize];
+    material.decode_image(0, light, view, &mut scratch, &mut image).expect("buffers fit");
+    let mut channels = vec![vec![0; image.len()]; 3];
+    for (c, channel) in channels.iter_mut().enumerate() {
+        material.decode_channel(c, 0, light, view, &mut scratch, channel).expect("buffers fit");
+        let short = channel.len() - 1;
+        let error = material
+            .decode_channel(c, 0, light, view, &mut scratch, &mut channel[..short])
+            .expect_err("one texel too few");
+        assert_eq!((error.needed, error.lent), (short + 1, short));
+    }
+    let (light, view) = (material.locate_light(light), material.locate_view(view));
+    for _ in 0..4 {
+        let (x, y) = (random.word() % width, random.word() % height);
+        let values = texel_values(material.words(), material.material(), x, y, &light, &view);
+        let at = (y * width + x) as usize;
+        assert_eq!(radiance(material.material(), values, &light), image[at]);
+        assert_eq!([values.c0, values.c1, values.c2], [channels[0][at], channels[1][at], channels[2][at]]);
+    }
 }
 
 /// Directions and positions of any floats lie where they may.
@@ -378,7 +371,7 @@ pub fn paths(data: &[u8]) {
     }
 }
 
-/// Reads bytes as every kind of foreign or working file that there is.
+/// Reads bytes as every kind of third-party or working file that there is.
 pub fn importers(data: &[u8]) {
     let mut rest = data;
     let kind = take(&mut rest);

@@ -196,11 +196,34 @@ fn the_kernel_is_translated() {
 }
 
 /// From a model to a file and on, as a user would do it: every new command once, and its exit codes.
+/// A folder in which one command's result is the next one's source.
+struct Place(tempfile::TempDir);
+
+impl Place {
+    fn at(&self, name: &str) -> String {
+        self.0.path().join(name).to_str().expect("UTF-8").to_owned()
+    }
+
+    fn bytes(&self, name: &str) -> Vec<u8> {
+        std::fs::read(self.0.path().join(name)).expect("a file")
+    }
+}
+
 #[test]
 fn synth_train_encode_compare_trim_blend_export_import() {
-    let folder = tempfile::tempdir().expect("folder");
-    let at = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
-    let (data, other, dictionary) = (at("checker.selvset"), at("other.selvset"), at("d.selvdict"));
+    let place = Place(tempfile::tempdir().expect("folder"));
+    synthesise(&place);
+    train(&place);
+    encode(&place);
+    compare(&place);
+    trim_and_blend(&place);
+    export_and_import(&place);
+}
+
+/// Two checkers, whatever the number of threads.
+fn synthesise(place: &Place) {
+    let at = |name: &str| place.at(name);
+    let (data, other) = (at("checker.selvset"), at("other.selvset"));
     assert_eq!(code(&["synth", "checker", "--size", "12x10", "--samples", "1", "-o", &data]), 0);
     assert_eq!(
         code(&["synth", "checker", "--size", "12x10", "--samples", "1", "--seed", "2", "-o", &other]),
@@ -211,34 +234,38 @@ fn synth_train_encode_compare_trim_blend_export_import() {
         code(&["synth", "checker", "--size", "12x10", "--samples", "1", "--threads", "1", "-o", &again]),
         0
     );
-    assert!(
-        std::fs::read(&data).expect("data") == std::fs::read(&again).expect("data"),
-        "threads change no byte"
-    );
+    assert!(place.bytes("checker.selvset") == place.bytes("again.selvset"), "threads change no byte");
     assert_eq!(code(&["synth", "marble", "-o", &at("x")]), 1);
+}
 
+/// A dictionary, also by a training that is killed in the middle and resumed.
+fn train(place: &Place) {
+    let at = |name: &str| place.at(name);
+    let (other, dictionary) = (at("other.selvset"), at("d.selvdict"));
     let training =
         ["--dictionaries", "2", "--edge", "4", "--iterations", "3", "--sparsity", "16,4,4", "--quiet"];
     assert_eq!(code(&[["train", &other, "-o", &dictionary].as_slice(), &training].concat()), 0);
-    // A training that is killed in the middle goes on to the same file.
+    // A training that is killed in the middle is resumed and writes the same file.
     std::fs::create_dir(at("killed")).expect("a folder");
     let killed = at("killed/d.selvdict");
     let mut child = Command::new(program())
         .args([["train", &other, "-o", &killed].as_slice(), &training].concat())
         .spawn()
         .expect("runs");
-    let state = folder.path().join("killed/d.selvdict.training");
+    let state = place.0.path().join("killed/d.selvdict.training");
     while !state.exists() && child.try_wait().expect("a child").is_none() {
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
     let _ = child.kill();
     let _ = child.wait();
     assert_eq!(code(&[["train", &other, "-o", &killed].as_slice(), &training].concat()), 0);
-    assert!(
-        std::fs::read(&killed).expect("dictionary") == std::fs::read(&dictionary).expect("dictionary"),
-        "the same file after all"
-    );
+    assert!(place.bytes("killed/d.selvdict") == place.bytes("d.selvdict"), "the same file after all");
+}
 
+/// With columns of its own, with trained ones inside and outside of the file, and for goals that are none.
+fn encode(place: &Place) {
+    let at = |name: &str| place.at(name);
+    let (data, dictionary) = (at("checker.selvset"), at("d.selvdict"));
     let (own, trained, external) = (at("own.selv"), at("trained.selv"), at("external.selv"));
     let report = run(&[
         "encode", &data, "-o", &own, "--rmse", "0.7", "--edge", "4", "--layers", "2", "--levels", "2",
@@ -259,8 +286,13 @@ fn synth_train_encode_compare_trim_blend_export_import() {
     assert_eq!(code(&["validate", &external, "--dictionary", &dictionary]), 0);
     assert_eq!(code(&["encode", &data, "-o", &at("x.selv")]), 1, "a goal is missing");
     assert_eq!(code(&["encode", &data, "-o", &at("x.selv"), "--size", "10"]), 1, "too small");
-    assert!(!folder.path().join("x.selv").exists());
+    assert!(!place.0.path().join("x.selv").exists());
+}
 
+/// The exit codes of idiff.
+fn compare(place: &Place) {
+    let at = |name: &str| place.at(name);
+    let (data, own) = (at("checker.selvset"), at("own.selv"));
     assert_eq!(code(&["compare", &data, &data]), 0);
     let picture = at("compare.png");
     assert_eq!(
@@ -283,7 +315,11 @@ fn synth_train_encode_compare_trim_blend_export_import() {
     assert_eq!(code(&["compare", &data, &own]), 2);
     assert_eq!(code(&["compare", &data, "does-not-exist"]), 4);
     assert_eq!(&std::fs::read(&picture).expect("png")[1..4], b"PNG");
+}
 
+fn trim_and_blend(place: &Place) {
+    let at = |name: &str| place.at(name);
+    let (data, other, own) = (at("checker.selvset"), at("other.selvset"), at("own.selv"));
     let (trimmed, blended) = (at("trimmed.selv"), at("blended.selv"));
     assert_eq!(
         code(&[
@@ -315,7 +351,11 @@ fn synth_train_encode_compare_trim_blend_export_import() {
     assert_eq!(code(&["compare", &own, &blended]), 0);
     assert_eq!(code(&["blend", &own, &second, "--alpha", "2", "-o", &blended]), 1);
     assert_eq!(code(&["compare", &data, &at("images")]), 4);
+}
 
+fn export_and_import(place: &Place) {
+    let at = |name: &str| place.at(name);
+    let data = at("checker.selvset");
     let small = at("small.selvset");
     assert_eq!(code(&["synth", "checker", "--size", "2", "--samples", "1", "-o", &small]), 0);
     assert_eq!(code(&["export", &small, "-o", &at("images")]), 0);
@@ -330,5 +370,5 @@ fn synth_train_encode_compare_trim_blend_export_import() {
         .find(|p| p.extension().is_some_and(|e| e == "exr"));
     std::fs::remove_file(gone.expect("an image")).expect("removed");
     assert_ne!(code(&["import", &at("images"), "-o", &at("broken.selvset")]), 0);
-    assert!(!folder.path().join("broken.selvset").exists());
+    assert!(!place.0.path().join("broken.selvset").exists());
 }

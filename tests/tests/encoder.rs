@@ -6,13 +6,14 @@ use selvedge::{Limits, Selvedge};
 use selvedge_tools::data::dataset::{Dataset, Description, Sample, Writer};
 use selvedge_tools::data::directions;
 use selvedge_tools::data::pyramid;
+use selvedge_tools::data::transfer::Domain;
 use selvedge_tools::encode::goal::{Goal, Verified};
 use selvedge_tools::error::ToolError;
 use selvedge_tools::format::model::{MetadataModel, TransferModel};
 use selvedge_tools::format::write;
 use selvedge_tools::math::random::Random;
-use selvedge_tools::measure::baseline::pca::Domain;
-use selvedge_tools::measure::compare::{Metrics, Source, compare};
+use selvedge_tools::measure::compare::{Metrics, compare};
+use selvedge_tools::measure::radiance::AtLevel;
 use selvedge_tools::methods::sparse_ensemble::dictionary_file::{self, Training};
 use selvedge_tools::methods::sparse_ensemble::encode::verified::encode_verified;
 use selvedge_tools::methods::sparse_ensemble::encode::{Criterion, Encoded, Options, encode, prepare};
@@ -62,8 +63,8 @@ fn open(bytes: &[u8]) -> Selvedge<'_> {
 fn measured(data: &Dataset, bytes: &[u8]) -> Metrics {
     let file = open(bytes);
     compare(
-        Source::Data(data),
-        Source::File(&file, 0),
+        data,
+        &AtLevel::finest(&file),
         data.description(),
         data.statistics().log_offset(),
         None,
@@ -231,7 +232,7 @@ fn layers_and_levels_are_coarser_files() {
     let file = open(&encoded.bytes);
     assert_eq!((file.header().layer_count, file.header().level_count), (3, 3));
     let log_rms = |data: &Dataset, file: &Selvedge<'_>, level| {
-        compare(Source::Data(data), Source::File(file, level), data.description(), 1e-3, None, &|_, _| ())
+        compare(data, &AtLevel { file, level }, data.description(), 1e-3, None, &|_, _| ())
             .expect("alike")
             .log_rms
     };
@@ -270,8 +271,8 @@ fn trained_dictionaries_serve_unseen_materials_inside_and_beside_the_file() {
         let beside = encode(&prepared, &ensembles, &options, &|_, _| ()).expect("encoded");
         let file = selvedge::open_with(&beside.bytes, Some(&bytes), &Limits::NONE).expect("legal");
         let found = compare(
-            Source::Data(&unseen),
-            Source::File(&file, 0),
+            &unseen,
+            &AtLevel::finest(&file),
             unseen.description(),
             unseen.statistics().log_offset(),
             None,

@@ -48,8 +48,13 @@ fn constants(folder: &str, ending: &str) -> BTreeMap<String, u32> {
     for (_, text) in files(folder, ending) {
         for line in text.lines().filter_map(|line| line.split_once("const METHOD_").map(|(_, rest)| rest)) {
             let Some((name, rest)) = line.split_once(": u32 = ") else { continue };
-            let digits: String = rest.chars().take_while(char::is_ascii_digit).collect();
-            found.insert(name.to_lowercase().replace('_', "-"), digits.parse().expect("a number"));
+            let digits: String = rest.chars().take_while(char::is_ascii_alphanumeric).collect();
+            let digits = digits.trim_end_matches('u');
+            let number = match digits.strip_prefix("0x") {
+                Some(digits) => u32::from_str_radix(digits, 16),
+                None => digits.parse(),
+            };
+            found.insert(name.to_lowercase().replace('_', "-"), number.expect("a number"));
         }
     }
     found
@@ -100,7 +105,10 @@ fn features(manifest: &str) -> BTreeMap<String, String> {
     let (_, rest) = text.split_once("[features]").expect("features");
     let section = rest.split("\n[").next().unwrap_or(rest);
     let lines = section.lines().filter(|line| !line.starts_with('#'));
-    lines.filter_map(|line| line.split_once(" = ")).map(|(name, on)| (name.to_owned(), on.to_owned())).collect()
+    lines
+        .filter_map(|line| line.split_once(" = "))
+        .map(|(name, on)| (name.to_owned(), on.to_owned()))
+        .collect()
 }
 
 #[test]

@@ -32,8 +32,10 @@ fn batch_equals_plain(material: &Selvedge<'_>, random: &mut Random, count: usize
     for (query, rgb) in queries.iter().zip(&out) {
         assert_eq!(material.filtered(query.u_q32, query.v_q32, query.light, query.view), *rgb, "{query:?}");
     }
-    let short = scratch.len() - 1;
-    assert!(material.sample_batch(&queries, &mut scratch[..short], &mut out).is_err());
+    // A method without a fast path of its own needs no scratch.
+    if let Some((_, short)) = scratch.split_last_mut() {
+        assert!(material.sample_batch(&queries, short, &mut out).is_err());
+    }
 }
 
 fn image_equals_plain(material: &Selvedge<'_>, random: &mut Random) {

@@ -8,7 +8,7 @@ use selvedge_tools::format::write;
 use selvedge_tools::gpu::runner::{Gpu, Query, backends};
 use selvedge_tools::math::random::Random;
 use selvedge_tools::methods::sparse_ensemble::sparsebtf;
-use selvedge_tools::show::demo::{VALUE_BITS, channel_error};
+use selvedge_tools::show::excerpt::channel_error;
 use std::f64::consts::LN_2;
 
 /// Natural logarithm of a Q20 value.
@@ -45,7 +45,7 @@ fn check_values_hold_on_cpu_and_kernel() {
     let mut worst = 0.0f64;
     for name in ["carpet07", "felt05"] {
         let authors = sparsebtf::read_material(&folder, name, None).expect("data");
-        let bytes = write::write_material(&authors.to_model(VALUE_BITS).expect("model"));
+        let bytes = write::write_material(&authors.to_model(sparsebtf::VALUE_BITS).expect("model"));
         let material = selvedge::open(&bytes, &Limits::default()).expect("legal");
         for &(_, x, y, light, view, u, v) in CHECK_VALUES.iter().filter(|check| check.0 == name) {
             assert!(
@@ -77,7 +77,7 @@ fn check_values_hold_on_cpu_and_kernel() {
 fn hold_error(folder: &std::path::Path, pairs: usize) {
     for name in ["carpet07", "felt05"] {
         let authors = sparsebtf::read_material(folder, name, None).expect("data");
-        let bytes = write::write_material(&authors.to_model(VALUE_BITS).expect("model"));
+        let bytes = write::write_material(&authors.to_model(sparsebtf::VALUE_BITS).expect("model"));
         let material = selvedge::open(&bytes, &Limits::default()).expect("legal");
         let pairs: Vec<[usize; 2]> = (0..pairs).map(|i| [(i * 37 + 5) % 151, (i * 61 + 9) % 151]).collect();
         for channel in [1, 2] {
@@ -106,7 +106,7 @@ fn texture_is_kept_in_the_full_materials() {
 #[test]
 fn the_excerpt_imports_to_the_same_bytes() {
     let model = sparsebtf::read_material(&excerpt_folder(), "carpet07", None)
-        .and_then(|m| m.to_model(VALUE_BITS))
+        .and_then(|m| m.to_model(sparsebtf::VALUE_BITS))
         .expect("data");
     let stored = std::fs::read(excerpt_file()).expect("file");
     assert!(write::write_material(&model) == stored);
@@ -120,8 +120,9 @@ fn values_are_continuous_in_the_directions() {
         .unwrap_or_else(excerpt_folder);
     let step = 0.01f64.to_radians();
     for name in ["carpet07", "felt05"] {
-        let model =
-            sparsebtf::read_material(&folder, name, None).and_then(|m| m.to_model(VALUE_BITS)).expect("data");
+        let model = sparsebtf::read_material(&folder, name, None)
+            .and_then(|m| m.to_model(sparsebtf::VALUE_BITS))
+            .expect("data");
         let bytes = write::write_material(&model);
         let material = selvedge::open(&bytes, &Limits::default()).expect("legal");
         let mut random = Random::new(5);

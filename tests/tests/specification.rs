@@ -2,7 +2,7 @@
 
 use selvedge::Rule;
 use selvedge_tools::check::example::hex_dump;
-use selvedge_tools::methods::{sparse_ensemble, sparse_tensor};
+use selvedge_tools::methods::{METHODS, Method};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -35,25 +35,10 @@ fn files_below(folder: &Path, extensions: &[&str]) -> Vec<PathBuf> {
     files
 }
 
-/// The chapter number of a method's text, from its first line, such as `# 10 Sparse ensemble`.
-fn chapter_number(text: &str) -> Option<u32> {
-    text.lines().next()?.strip_prefix("# ")?.split(' ').next()?.parse().ok()
-}
-
 /// The specification: the shared chapters, then the chapters of the methods by their numbers.
 fn specification() -> String {
-    let mut chapters: Vec<(u32, String)> = files_below(&path_of("spec/methods"), &["md"])
-        .iter()
-        .map(|path| {
-            let text = std::fs::read_to_string(path).expect("a method's chapter");
-            let number = chapter_number(&text);
-            (number.unwrap_or_else(|| panic!("{}: no chapter number", path.display())), text)
-        })
-        .collect();
-    chapters.sort();
-    assert!(chapters.windows(2).all(|pair| pair[0].0 < pair[1].0), "a chapter number is used twice");
     let mut text = read("spec/selvedge-1.md");
-    for (_, chapter) in chapters {
+    for (_, chapter) in selvedge_tests::method_chapters() {
         text.push('\n');
         text.push_str(&chapter);
     }
@@ -123,7 +108,7 @@ fn every_rule_that_a_comment_cites_is_in_the_specification() {
 
 #[test]
 fn the_conformance_table_has_a_row_for_every_rule() {
-    let table = read("spec/conformance.md");
+    let table = selvedge_tests::conformance_table();
     let rows: Vec<Vec<String>> = table
         .lines()
         .filter(|line| line.starts_with("| ") && line.as_bytes().get(2).is_some_and(u8::is_ascii_digit))
@@ -139,50 +124,57 @@ fn the_conformance_table_has_a_row_for_every_rule() {
     }
 }
 
+/// What begins a block of an example's bytes: `hex` alone of the first method's, which shows the shared
+/// chapters too, and with the last word of its name of another's.
+fn fence_of(method: &Method) -> String {
+    if method == METHODS[0] {
+        return "```hex".into();
+    }
+    format!("```hex {}", method.name.rsplit('-').next().expect("a word"))
+}
+
+/// Holds the blocks of an example against its file; gives the bytes that are shown.
+fn shown_bytes(spec: &str, fence: &str, file: &[u8]) -> BTreeSet<usize> {
+    let mut shown = BTreeSet::new();
+    let mut inside = false;
+    for line in spec.lines() {
+        if line.starts_with("```") {
+            inside = line == fence;
+            continue;
+        }
+        if !inside || line.trim().is_empty() {
+            continue;
+        }
+        let mut words = line.split_whitespace();
+        let offset = usize::from_str_radix(words.next().expect("an offset"), 16).expect("hex");
+        let bytes: Vec<u8> = words.map(|byte| u8::from_str_radix(byte, 16).expect("hex")).collect();
+        let found = &file[offset..offset + bytes.len()];
+        assert_eq!(found, bytes, "{line}\nis\n{}", hex_dump(found, offset));
+        shown.extend(offset..offset + bytes.len());
+    }
+    shown
+}
+
 #[test]
 fn the_worked_example_is_what_the_writer_makes() {
     let spec = specification();
-    for (fence, method) in [("```hex", &sparse_ensemble::METHOD), ("```hex tensor", &sparse_tensor::METHOD)] {
+    for &method in METHODS {
         let file = selvedge_tools::format::write::write_material(&(method.example)());
-        let mut shown = BTreeSet::new();
-        let mut inside = false;
-        for line in spec.lines() {
-            if line.starts_with("```") {
-                inside = line == fence;
-                continue;
-            }
-            if inside && !line.trim().is_empty() {
-                let offset = usize::from_str_radix(line.split_whitespace().next().expect("an offset"), 16)
-                    .expect("hex");
-                let bytes: Vec<u8> = line
-                    .split_whitespace()
-                    .skip(1)
-                    .map(|byte| u8::from_str_radix(byte, 16).expect("hex"))
-                    .collect();
-                assert_eq!(
-                    &file[offset..offset + bytes.len()],
-                    bytes,
-                    "{line}\nis\n{}",
-                    hex_dump(&file[offset..offset + bytes.len()], offset)
-                );
-                shown.extend(offset..offset + bytes.len());
-            }
-        }
+        let shown = shown_bytes(&spec, &fence_of(method), &file);
         let opened = selvedge::open(&file, &selvedge::Limits::NONE).expect("legal");
         assert!(
             spec.contains(&selvedge_tools::format::bits::hex(&opened.decode_digest())),
-            "the decode digest of the example is another"
+            "the decode digest of the example of {method:?} is another"
         );
-        // Every byte but padding: a stranger can put the example together from the text. The second file
-        // shows what the first has not.
+        // Every byte but padding: a stranger can put the first example together from the text. Those of other
+        // methods show what the first has not.
+        let own = format!("section {:02x}", method.number);
         let parts = selvedge_tools::check::example::parts(&file);
         for (name, bytes, offset) in
-            parts.iter().filter(|(name, ..)| fence == "```hex" || name.starts_with("section 02"))
+            parts.iter().filter(|(name, ..)| method == METHODS[0] || name.starts_with(&own))
         {
-            assert!(
-                (*offset..offset + bytes.len()).all(|at| shown.contains(&at)),
-                "{name} is not shown whole"
-            );
+            let is_shown = (*offset..offset + bytes.len()).all(|at| shown.contains(&at));
+            assert!(is_shown, "{method:?}: {name} is not shown whole");
         }
     }
 }

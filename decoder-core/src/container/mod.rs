@@ -5,6 +5,8 @@
 
 pub mod directions;
 pub mod directory;
+pub(crate) mod directory_checks;
 pub mod header;
+pub(crate) mod header_checks;
 pub mod metadata;
 pub mod pair_table;

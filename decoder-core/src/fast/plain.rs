@@ -1,13 +1,13 @@
 //! Fast paths of a method that has none of its own: directions are located fast, textures made one by one.
 #![cfg_attr(not(test), allow(dead_code, reason = "methods at hand have their own; the next one begins here"))]
 
-use crate::batch::FilteredQuery;
 use crate::fast::finish::finish;
 use crate::fast::located::ReadySets;
 use crate::fast::{ImageQuery, Textures};
 use crate::kernel::colour::Rgb;
 use crate::kernel::interpolation::{place_at_position, place_at_texel};
 use crate::kernel::method::textures_q20;
+use crate::query::FilteredQuery;
 use crate::selvedge::Selvedge;
 
 /// Words of scratch of a batch.

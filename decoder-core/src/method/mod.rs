@@ -5,76 +5,18 @@
 //! leaves out what a build does not need.
 //!
 //! A method's module has, beside its twin functions: `check::METHOD`, `check::check_material`,
-//! `check::check_dictionary`, `check::dictionary_fits`, and with the feature `batch` a module `fast`, which may be
-//! `crate::fast::plain`.
+//! `check::check_dictionary`, `check::dictionary_fits`, and with the feature `batch` a module `fast`, which may be a
+//! file that takes over `crate::fast::plain`.
 
 use crate::container::header::Header;
 use crate::kernel::material::Material;
 use crate::kernel::method::each_method;
+use crate::method::rule::Method;
 use crate::walk::check::Check;
 
+pub mod rule;
 pub mod sparse_ensemble;
 pub mod sparse_tensor;
-
-/// Whether a section of a method has to be in a file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Call {
-    /// The header calls for it.
-    Required,
-    /// It may be there or not.
-    Allowed,
-    /// It must not be there.
-    Foreign,
-}
-
-/// Of what a file has one section of a kind, and how the instances are numbered (3.3).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Per {
-    /// One, instance 0, where any channel has texture.
-    File,
-    /// One for each channel with texture: its number.
-    Channel,
-    /// One for each level and quality layer: `level << 8 | layer << 4`.
-    Layer,
-    /// One for each level, quality layer and channel with texture: `level << 8 | layer << 4 | channel`.
-    LayerChannel,
-}
-
-/// Which file has a section (3.5).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Source {
-    /// The material's.
-    Material,
-    /// The external dictionary's if there is one, else the material's.
-    Dictionary,
-    /// The material's or, where that has none, the external dictionary's.
-    Either,
-}
-
-/// A kind of section that a method has.
-#[derive(Clone, Copy, Debug)]
-pub struct SectionRule {
-    /// Kind: the method's number in bits 8 to 15.
-    pub kind: u32,
-    /// Instances.
-    pub per: Per,
-    /// File.
-    pub source: Source,
-}
-
-/// What the rest of the core asks of a method.
-pub struct Method {
-    /// Number in the header (3.1-8).
-    pub number: u32,
-    /// Largest edge of a block (3.1-12).
-    pub largest_edge: u32,
-    /// Means of a channel with texture (8.1). A channel that is a mean alone always needs its means.
-    pub means: Call,
-    /// Scales of a channel with texture (8.2).
-    pub scales: Call,
-    /// Its kinds of sections, ascending.
-    pub sections: &'static [SectionRule],
-}
 
 macro_rules! dispatch {
     ($($feature:literal $module:ident $number:ident $textures:ident;)*) => {
@@ -122,7 +64,7 @@ macro_rules! dispatch {
         #[cfg(feature = "batch")]
         #[allow(unused_variables, reason = "a build may have no method")]
         pub(crate) mod fast {
-            use crate::batch::FilteredQuery;
+            use crate::query::FilteredQuery;
             use crate::fast::{ImageQuery, Textures};
             use crate::kernel::colour::Rgb;
             use crate::selvedge::Selvedge;
@@ -131,7 +73,7 @@ macro_rules! dispatch {
             pub(crate) fn batch_scratch_len(selvedge: &Selvedge<'_>, count: usize) -> usize {
                 match selvedge.material().method {
                     $(#[cfg(feature = $feature)]
-                    super::$module::$number => super::$module::fast::batch_scratch_len(selvedge, count),)*
+                    crate::method::$module::$number => crate::method::$module::fast::batch_scratch_len(selvedge, count),)*
                     _ => 0,
                 }
             }
@@ -145,7 +87,7 @@ macro_rules! dispatch {
             ) -> Option<()> {
                 match selvedge.material().method {
                     $(#[cfg(feature = $feature)]
-                    super::$module::$number => super::$module::fast::batch(selvedge, queries, scratch, out),)*
+                    crate::method::$module::$number => crate::method::$module::fast::batch(selvedge, queries, scratch, out),)*
                     _ => Some(()),
                 }
             }
@@ -154,7 +96,7 @@ macro_rules! dispatch {
             pub(crate) fn image_scratch_len(selvedge: &Selvedge<'_>) -> usize {
                 match selvedge.material().method {
                     $(#[cfg(feature = $feature)]
-                    super::$module::$number => super::$module::fast::image_scratch_len(selvedge),)*
+                    crate::method::$module::$number => crate::method::$module::fast::image_scratch_len(selvedge),)*
                     _ => 0,
                 }
             }
@@ -168,7 +110,7 @@ macro_rules! dispatch {
             ) {
                 match selvedge.material().method {
                     $(#[cfg(feature = $feature)]
-                    super::$module::$number => super::$module::fast::image(selvedge, query, scratch, textures),)*
+                    crate::method::$module::$number => crate::method::$module::fast::image(selvedge, query, scratch, textures),)*
                     _ => {}
                 }
             }
@@ -185,42 +127,4 @@ pub fn method_of(number: u32) -> Option<&'static Method> {
 /// The numbers of the methods of this build.
 pub fn numbers() -> impl Iterator<Item = u32> {
     METHODS.iter().map(|method| method.number)
-}
-
-impl Method {
-    /// The rule of a kind, if it is one of this method's.
-    pub fn section_rule(&self, kind: u32) -> Option<&'static SectionRule> {
-        self.sections.iter().find(|rule| rule.kind == kind)
-    }
-}
-
-impl SectionRule {
-    /// Whether a header has this instance (3.3).
-    pub fn has_instance(&self, header: &Header, instance: u32) -> bool {
-        let (level, layer, rest) = (instance >> 8, (instance >> 4) & 0xf, instance & 0xf);
-        let in_layers = level < header.level_count && layer < header.layer_count;
-        match self.per {
-            Per::File => instance == 0 && header.has_texture(),
-            Per::Channel => header.is_full(instance),
-            Per::Layer => in_layers && rest == 0 && header.has_texture(),
-            Per::LayerChannel => in_layers && rest < 3 && header.is_full(rest),
-        }
-    }
-
-    /// Whether a file of the header's content has to have an instance that [`SectionRule::has_instance`].
-    pub fn call(&self, in_dictionary: bool, external: bool) -> Call {
-        match (self.source, in_dictionary, external) {
-            (Source::Material, true, _) => Call::Foreign,
-            (Source::Material, false, _) => Call::Required,
-            (Source::Dictionary, true, _) | (Source::Dictionary, false, false) => Call::Required,
-            (Source::Dictionary, false, true) => Call::Foreign,
-            (Source::Either, true, _) | (Source::Either, false, true) => Call::Allowed,
-            (Source::Either, false, false) => Call::Required,
-        }
-    }
-}
-
-/// The instance of a level, quality layer and channel (3.3).
-pub fn layer_instance(level: u32, layer: u32, channel: u32) -> u32 {
-    level << 8 | layer << 4 | channel
 }

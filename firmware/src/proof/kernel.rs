@@ -9,6 +9,15 @@ use selvedge::{Direction, Located, Taps, Values};
 
 /// For numbers that no file may hold.
 pub fn call(files: words::Words<'_>) {
+    arithmetic(files);
+    directions_of(files);
+    positions_and_colours();
+    samples(files);
+    registry();
+}
+
+/// Chapters 1, 2 and 16, and what opening reads bits with.
+fn arithmetic(files: words::Words<'_>) {
     black_box((
         words::word(files, n()),
         words::packed_i16(files, n(), n()),
@@ -28,7 +37,13 @@ pub fn call(files: words::Words<'_>) {
         fixed::exp2_q31(n()),
         fixed::assemble_binary32(n(), i()),
     ));
+    black_box((cost::filtered_operations(any(cost::Shape::default()), any(0)), words::low_part(n(), n())));
+    let mut ones = stream::Ones::new(bytes(), n(), n());
+    black_box((stream::window(bytes(), n()), ones.take(), ones.take()));
+}
 
+/// Chapter 5.
+fn directions_of(files: words::Words<'_>) {
     black_box((
         direction::binary32_to_q30(n()),
         direction::project_q18(i(), n()),
@@ -70,7 +85,11 @@ pub fn call(files: words::Words<'_>) {
         directions::cell_range(n(), n()),
         directions::meets_cell(any([(0, 0); 3]), (i(), i()), (i(), i())),
     ));
+    black_box((direction::locate_sample(files, n(), n()), direction::between_q18(i(), i(), i())));
+}
 
+/// Chapters 6 and 7.
+fn positions_and_colours() {
     black_box((
         position::fraction_from_binary32(n()),
         position::block_of(n(), n()),
@@ -78,7 +97,6 @@ pub fn call(files: words::Words<'_>) {
     ));
     black_box((position::axis_at_position(n(), n(), n(), n()), position::texel_at_position(n(), n())));
     let one = any(material::Material::default());
-    let channel = any(material::Channel::default());
     black_box((
         position::block_count(&one, n()),
         material::level_size(n(), n()),
@@ -87,7 +105,7 @@ pub fn call(files: words::Words<'_>) {
 
     black_box(selvedge::container::metadata::is_invisible(any('a')));
 
-    let (values, taps) = (any(Values::default()), any(Taps::default()));
+    let values = any(Values::default());
     black_box((
         colour::matrix_row(i(), i(), i(), values),
         colour::present(n(), i(), i()),
@@ -98,7 +116,14 @@ pub fn call(files: words::Words<'_>) {
         colour::transfer(&one, i(), i()),
         colour::colour(&one, values, i()),
     ));
+    black_box((material::channel_of(&one, n()), material::part(&one, n())));
+}
 
+/// Chapters 8 and 9.
+fn samples(files: words::Words<'_>) {
+    let (values, taps) = (any(Values::default()), any(Taps::default()));
+    let one = any(material::Material::default());
+    let channel = any(material::Channel::default());
     let (place, located) = (any(position::Place::default()), any(Located::default()));
     black_box((
         interpolation::blend_table_q15(files, n(), n(), taps, taps),
@@ -113,7 +138,6 @@ pub fn call(files: words::Words<'_>) {
         interpolation::channel_q20(files, &one, n(), i(), taps, taps),
         method::textures_q20(files, &one, &place, &located, &located),
     ));
-    black_box((material::channel_of(&one, n()), material::part(&one, n())));
     black_box(interpolation::place_values(files, &one, &place, &located, &located));
     black_box((
         interpolation::place_at_position(&one, n(), n(), n()),
@@ -132,17 +156,8 @@ pub fn call(files: words::Words<'_>) {
         interpolation::locate_light(files, &one, any_direction()),
         interpolation::locate_view(files, &one, any_direction()),
     ));
-    black_box((
-        interpolation::light_sample(files, &one, n()),
-        interpolation::view_sample(files, &one, n()),
-        direction::locate_sample(files, n(), n()),
-        direction::between_q18(i(), i(), i()),
-    ));
+    black_box((interpolation::light_sample(files, &one, n()), interpolation::view_sample(files, &one, n())));
     black_box((interpolation::radiance(&one, values, &located), selvedge::next_query_word(&mut n())));
-    black_box((cost::filtered_operations(any(cost::Shape::default()), any(0)), words::low_part(n(), n())));
-    let mut ones = stream::Ones::new(bytes(), n(), n());
-    black_box((stream::window(bytes(), n()), ones.take(), ones.take()));
-    registry();
 }
 
 /// What every method says of itself.
@@ -155,5 +170,5 @@ fn registry() {
             }
         }
     }
-    black_box(selvedge::method::layer_instance(n(), n(), n()));
+    black_box(selvedge::method::rule::layer_instance(n(), n(), n()));
 }

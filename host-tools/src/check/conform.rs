@@ -14,7 +14,7 @@ use std::io::{BufRead, BufReader, BufWriter, Write};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// A vector that was answered otherwise than stated.
+/// A vector whose answer differs from the stated one.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Disagreement {
     /// Path of the vector.
@@ -47,7 +47,7 @@ fn by_path(vectors: &[Vector]) -> BTreeMap<&str, &Vector> {
     vectors.iter().map(|vector| (vector.path.as_str(), vector)).collect()
 }
 
-/// Holds this decoder against a suite.
+/// Runs this decoder over a suite.
 ///
 /// # Errors
 /// If a vector names a dictionary that is not there.
@@ -64,7 +64,7 @@ pub fn run_own(vectors: &[Vector]) -> Result<Vec<Disagreement>> {
     Ok(vectors.par_iter().map(check).collect::<Result<Vec<_>>>()?.into_iter().flatten().collect())
 }
 
-/// Holds a program against a suite.
+/// Runs a program over a suite.
 ///
 /// # Errors
 /// If the program cannot be run or ends before it has answered.

@@ -1,4 +1,4 @@
-//! Files held against the specification: findings, advice, costs, samples taken apart, and the conformance suite.
+//! Files against the specification: findings, advice, costs, explained samples, and the conformance suite.
 
 pub mod conform;
 pub mod count;

@@ -1,4 +1,5 @@
-//! The conformance suite: readable recipes become files, and files are held against what their recipes state.
+//! The conformance suite: readable recipes become files, and files are checked against what their
+//! recipes state.
 //!
 //! A recipe names a base, changes to its model by JSON pointer, and changes to its bytes by place; an invalid
 //! one states the rule that is broken, where, and what is found there (1.4-4). What is stated comes from the
@@ -188,7 +189,7 @@ fn part_name(part: selvedge::Part) -> &'static str {
     if part == selvedge::Part::File { "file" } else { "dictionary" }
 }
 
-/// What this decoder says of a vector.
+/// This decoder's answer to a vector.
 pub fn answer(bytes: &[u8], dictionary: Option<&[u8]>, limits: &Limits) -> Answer {
     if is_dictionary(bytes) {
         let mut first = selvedge::First::default();
@@ -308,7 +309,8 @@ fn make_one(
 /// The list of a suite: a line a vector, columns parted by tabs.
 pub fn manifest(vectors: &[Vector]) -> String {
     let mut text = String::from(
-        "# valid\tfile\tdictionary\tdecode digest\n# invalid\tfile\tdictionary\tlimits: bytes,operations,texels\trule\tpart\toffset\tfound\n",
+        "# valid\tfile\tdictionary\tdecode digest\n# invalid\tfile\tdictionary\t\
+         limits: bytes,operations,texels\trule\tpart\toffset\tfound\n",
     );
     for v in vectors {
         let dictionary = v.dictionary.as_deref().unwrap_or("-");

@@ -10,13 +10,13 @@ use std::path::PathBuf;
 
 #[derive(Args)]
 pub struct Arguments {
-    /// Files
+    /// Files to measure
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// The external dictionary of the files
+    /// External dictionary of the files
     #[arg(long)]
     dictionary: Option<PathBuf>,
-    /// As JSON
+    /// Print as JSON
     #[arg(long)]
     json: bool,
     #[command(flatten)]

@@ -20,19 +20,19 @@ pub struct Arguments {
     /// The file to write
     #[arg(short, long)]
     output: PathBuf,
-    /// Position between them, 0 to 1
+    /// Weight of B, 0 to 1
     #[arg(long, default_value_t = 0.5)]
     alpha: f64,
-    /// External dictionary of both
+    /// External dictionary of both files
     #[arg(long)]
     dictionary: Option<PathBuf>,
-    /// Keep both sets of coefficients instead of changing a basis: lossless, a sample costs both
+    /// Keep the coefficients of both instead of changing the basis: exact, and a sample costs as much as both
     #[arg(long)]
     exact: bool,
     /// Maximum coefficients of a block; the sum of both if not given
     #[arg(long)]
     most: Option<u32>,
-    /// Allow blending under different scales
+    /// Allow blending of materials whose scales differ
     #[arg(long)]
     scales_apart: bool,
 }

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 /// Number of threads; results do not depend on it.
 #[derive(Args)]
 pub struct Threads {
-    /// Threads, all cores if not given; output does not depend on it
+    /// Threads; all cores if not given. Results do not depend on it
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
 }
@@ -29,9 +29,9 @@ impl Threads {
 /// A file and its external dictionary.
 #[derive(Args)]
 pub struct FileArgs {
-    /// The file, - for standard input
+    /// The file; - for standard input
     pub file: PathBuf,
-    /// Its external dictionary
+    /// External dictionary of the file
     #[arg(long)]
     pub dictionary: Option<PathBuf>,
     #[command(flatten)]
@@ -41,13 +41,13 @@ pub struct FileArgs {
 /// Resource limits.
 #[derive(Args)]
 pub struct LimitArgs {
-    /// Refuse larger files, bytes
+    /// Refuse files of more bytes
     #[arg(long, default_value_t = Limits::default().bytes)]
     max_bytes: u32,
     /// Refuse files that state more operations per sample
     #[arg(long, default_value_t = Limits::default().operations)]
     max_operations: u32,
-    /// Refuse larger images, texels
+    /// Refuse images of more texels
     #[arg(long, default_value_t = Limits::default().texels)]
     max_texels: u32,
 }
@@ -96,34 +96,12 @@ pub fn with_material<T>(
     })?)
 }
 
-/// Bytes of images held at once.
-pub const MEMORY: usize = 256 << 20;
-
-/// Refuses an option that would do nothing.
-pub fn check_applies(option: &str, is_given: bool, applies: bool, to: &str) -> Result<()> {
-    if is_given && !applies { Err(ToolError::Usage(format!("{option} is for {to} alone"))) } else { Ok(()) }
-}
-
-/// Refuses an output that could not be written after hours of work, or would take the place of its source.
-pub fn check_output(source: &Path, output: &Path, is_folder: bool) -> Result<()> {
-    let refuse = |why: &str| Err(ToolError::Usage(format!("{}: {why}", output.display())));
-    if !is_folder && output.is_dir() {
-        return refuse("this is a folder; a file is written");
-    }
-    let is_same =
-        source == output || source.canonicalize().is_ok_and(|a| output.canonicalize().is_ok_and(|b| a == b));
-    if is_same {
-        return refuse("this is the source");
-    }
-    Ok(())
-}
-
 /// Warns of a file whose triangulation differs from the one that this tool computes.
 pub fn warn_of_triangles(path: &Path, file: &Selvedge<'_>) {
     if !read::same_triangles(file) {
         eprintln!(
-            "warning: {}: its triangulation differs from the one that this tool computes; interpolated bits may \
-             change",
+            "warning: {}: its triangulation differs from the one that this tool computes; interpolated bits \
+             may change",
             path.display()
         );
     }

@@ -5,7 +5,8 @@ use super::parse;
 use crate::data::picture;
 use crate::encode::parse::positive;
 use crate::error::{Result, ToolError};
-use crate::measure::compare::{self, Metrics, Place, Source};
+use crate::measure::compare::{self, Metrics, Place};
+use crate::measure::radiance::{AtLevel, Radiance};
 use crate::progress::Progress;
 use clap::{Args, ValueEnum};
 use selvedge::{Direction, Limits, Selvedge};
@@ -32,27 +33,29 @@ pub struct Arguments {
     /// Metric that --warn and --fail are thresholds of
     #[arg(long, value_enum, default_value = "largest")]
     by: Limited,
-    /// Warn above
+    /// Warn if the metric is above this
     #[arg(long, default_value_t = 1e-6)]
     warn: f64,
-    /// Fail above
+    /// Fail if the metric is above this
     #[arg(long, default_value_t = 1e-6)]
     fail: f64,
     /// Peak value of the PSNR; the largest value of the reference if not given
     #[arg(long, value_parser = positive)]
     peak: Option<f64>,
-    /// As JSON
+    /// Print as JSON
     #[arg(long)]
     json: bool,
-    /// Write other, reference and the error in false colour side by side to this picture
+    /// Write a picture of the material under test, the reference and the error in false colour, side by side
     #[arg(long)]
     picture: Option<PathBuf>,
     /// Light of the picture: angle from the normal and azimuth, degrees; snapped to the nearest direction of
     /// the reference
-    #[arg(long, default_value = "30,0", value_parser = parse::angles, allow_hyphen_values = true)]
+    #[arg(long, value_parser = parse::angles, allow_hyphen_values = true)]
+    #[arg(default_value = "30,0", value_name = "POLAR,AZIMUTH")]
     light: Direction,
     /// View of the picture
-    #[arg(long, default_value = "0,0", value_parser = parse::angles, allow_hyphen_values = true)]
+    #[arg(long, value_parser = parse::angles, allow_hyphen_values = true)]
+    #[arg(default_value = "0,0", value_name = "POLAR,AZIMUTH")]
     view: Direction,
     /// Error of ln(x + offset) that is white in the picture
     #[arg(long, default_value_t = 1.0, value_parser = positive)]
@@ -90,10 +93,10 @@ fn compare(args: Arguments) -> Result<u8> {
     let [a, b] = [&args.reference, &args.other].map(|path| Given::open(path, args.dictionary.as_deref()));
     let (a, b) = (a?, b?);
     let (file_a, file_b) = (a.opened(&args.reference, &limits)?, b.opened(&args.other, &limits)?);
-    fn source<'a>(given: &'a Given, file: &'a Option<Selvedge<'a>>) -> Source<'a> {
+    fn source<'a>(given: &'a Given, file: &'a Option<Selvedge<'a>>) -> Box<dyn Radiance + 'a> {
         match (given, file) {
-            (Given::Data(data), _) => Source::Data(data),
-            (_, Some(file)) => Source::File(file, 0),
+            (Given::Data(data), _) => Box::new(data),
+            (_, Some(file)) => Box::new(AtLevel::finest(file)),
             (Given::File(..), None) => unreachable!("a file is opened or refused"),
         }
     }
@@ -104,7 +107,7 @@ fn compare(args: Arguments) -> Result<u8> {
         (Given::File(..), None) => unreachable!("a file is opened or refused"),
     };
     let progress = Progress::new();
-    let metrics = compare::compare(reference, other, &description, offset, args.peak, &|done, all| {
+    let metrics = compare::compare(&*reference, &*other, &description, offset, args.peak, &|done, all| {
         progress.report("comparing", done, all)
     })?;
     progress.clear();
@@ -116,7 +119,7 @@ fn compare(args: Arguments) -> Result<u8> {
     if let Some(path) = &args.picture {
         let [light, view] = [(&description.lights, args.light), (&description.views, args.view)]
             .map(|(set, asked)| compare::nearest(set, asked));
-        let [a, b] = [reference, other].map(|source| compare::image(source, &description, light, view));
+        let [a, b] = [&reference, &other].map(|source| compare::image(&**source, &description, light, view));
         picture::beside_error(&b?, &a?, description.size, offset, args.white as f32, args.exposure as f32)
             .save(path)?;
     }

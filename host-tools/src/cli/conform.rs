@@ -11,7 +11,7 @@ use std::path::PathBuf;
 pub struct Arguments {
     /// Folder of the suite, with its manifest.tsv
     folder: PathBuf,
-    /// Make the files of the suite from its recipes first
+    /// Regenerate the files of the suite from its recipes first
     #[arg(long)]
     make: bool,
     /// The program and its arguments, behind --
@@ -29,8 +29,8 @@ pub fn run(args: Arguments) -> Result<u8> {
     let found =
         if program.is_empty() { conform::run_own(&suite)? } else { conform::run_program(&suite, program)? };
     for d in &found {
-        print(&format!("{}: {} is stated, {} was answered\n", d.path, d.stated, d.answered))?;
+        print(&format!("{}: {} is stated, the answer is {}\n", d.path, d.stated, d.answered))?;
     }
-    eprintln!("{} vectors, {} answered otherwise than stated", suite.len(), found.len());
+    eprintln!("{} vectors, {} answers differ from those stated", suite.len(), found.len());
     Ok(if found.is_empty() { 0 } else { 3 })
 }

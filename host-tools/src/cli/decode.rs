@@ -13,19 +13,21 @@ use std::path::PathBuf;
 pub struct Arguments {
     #[command(flatten)]
     source: FileArgs,
-    /// The picture to write
+    /// The picture to write, .png or .exr
     #[arg(short, long)]
     output: PathBuf,
     /// Light: angle from the normal and azimuth, degrees
-    #[arg(long, default_value = "30,0", value_parser = parse::angles, allow_hyphen_values = true)]
+    #[arg(long, value_parser = parse::angles, allow_hyphen_values = true)]
+    #[arg(default_value = "30,0", value_name = "POLAR,AZIMUTH")]
     light: Direction,
     /// View: angle from the normal and azimuth, degrees
-    #[arg(long, default_value = "0,0", value_parser = parse::angles, allow_hyphen_values = true)]
+    #[arg(long, value_parser = parse::angles, allow_hyphen_values = true)]
+    #[arg(default_value = "0,0", value_name = "POLAR,AZIMUTH")]
     view: Direction,
     /// Level of detail
     #[arg(long, default_value_t = 0)]
     level: u32,
-    /// Quality layers to decode
+    /// Quality layers to decode; all if not given
     #[arg(long)]
     layers: Option<u32>,
     /// Exposure factor of a .png; an .exr has the decoder's bits

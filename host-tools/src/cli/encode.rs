@@ -4,6 +4,7 @@ use super::common::{Threads, print_json};
 use super::parse;
 use crate::data::dataset::Dataset;
 use crate::data::pyramid;
+use crate::data::transfer::Domain;
 use crate::encode::ENCODERS;
 use crate::encode::auto::{self, Preference};
 use crate::encode::encoder::{Common, Encoded, Encoder, Levels, Settings, encode};
@@ -11,7 +12,6 @@ use crate::encode::goal::{Goal, domain_name};
 use crate::encode::parse::{positive, three};
 use crate::error::{Result, ToolError};
 use crate::files;
-use crate::measure::baseline::pca::Domain;
 use crate::measure::compare::Metrics;
 use crate::progress::Progress;
 use clap::builder::{PossibleValue, PossibleValuesParser};
@@ -66,7 +66,7 @@ struct Shared {
     /// Error domain of --rmse
     #[arg(long, value_enum, default_value = "log")]
     domain: DomainName,
-    /// Method of the file
+    /// Encoding method
     #[arg(long, value_parser = methods(), default_value = ENCODERS[0].method())]
     method: String,
     /// Objective of --method auto among files that reach the goal; error if the goal is a size, bytes if it
@@ -76,7 +76,7 @@ struct Shared {
     /// Budget: operations of a filtered sample that the file may state
     #[arg(long)]
     operations: Option<u32>,
-    /// Domain that is coded; log if not given, both with --method auto
+    /// Domain that is encoded; log if not given, both with --method auto
     #[arg(long, value_enum)]
     transfer: Option<DomainName>,
     /// Offset of the logarithm; a thousandth of the mean if not given

@@ -12,19 +12,21 @@ use selvedge::Direction;
 pub struct Arguments {
     #[command(flatten)]
     source: FileArgs,
-    /// The texel, as 10,20
+    /// The texel to explain, x and y, as 10,20
     #[arg(long, value_parser = parse::texel)]
     texel: [u32; 2],
     /// Light: angle from the normal and azimuth, degrees
-    #[arg(long, default_value = "30,0", value_parser = parse::angles, allow_hyphen_values = true)]
+    #[arg(long, value_parser = parse::angles, allow_hyphen_values = true)]
+    #[arg(default_value = "30,0", value_name = "POLAR,AZIMUTH")]
     light: Direction,
     /// View: angle from the normal and azimuth, degrees
-    #[arg(long, default_value = "0,0", value_parser = parse::angles, allow_hyphen_values = true)]
+    #[arg(long, value_parser = parse::angles, allow_hyphen_values = true)]
+    #[arg(default_value = "0,0", value_name = "POLAR,AZIMUTH")]
     view: Direction,
     /// Coefficients listed per record
     #[arg(long, default_value_t = 8)]
     most: usize,
-    /// As JSON, with all coefficients
+    /// Print as JSON, with all coefficients
     #[arg(long)]
     json: bool,
 }

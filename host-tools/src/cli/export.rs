@@ -1,6 +1,7 @@
 //! `export`: a dataset or a decoded file in a third-party format.
 
-use super::common::{Given, MEMORY, Threads, check_applies, check_output};
+use super::common::{Given, Threads};
+use super::exchange::{MEMORY, check_applies, check_output};
 use super::parse;
 use crate::data::expand::expand;
 use crate::error::{Result, ToolError};
@@ -14,13 +15,13 @@ use std::path::PathBuf;
 /// Third-party formats.
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
 enum Format {
-    /// Folder of EXR with every bit
+    /// Folder of EXR, lossless
     Exr,
     /// Folder of PNG: 16-bit sRGB, values above 1 clipped
     Png,
     /// Zip archive of JPEG, named as those of UBO2003
     Ubo2003,
-    /// Full-matrix factorisation of Bonn, FMF06FC
+    /// Full-matrix factorisation in a .btf (Bonn, FMF06FC)
     Btf,
 }
 
@@ -40,10 +41,10 @@ pub struct Arguments {
     /// Quality of a JPEG, 1 to 100; 95 if not given
     #[arg(long, value_parser = clap::value_parser!(u8).range(1..=100))]
     quality: Option<u8>,
-    /// Scale of the values in a JPEG; 1 if not given
+    /// Scale of the values of a JPEG; 1 if not given
     #[arg(long, value_parser = parse::exposure)]
     exposure: Option<f32>,
-    /// External dictionary of a file
+    /// External dictionary of the source, if that is a file
     #[arg(long)]
     dictionary: Option<PathBuf>,
     #[command(flatten)]
@@ -99,7 +100,7 @@ pub fn run(args: Arguments) -> Result<u8> {
                 memory: MEMORY,
             };
             let exported = ubo::export(&dataset, &args.output, &options, &writing)?;
-            count_clipped(exported.cut);
+            count_clipped(exported.clipped);
             if let (count @ 1.., worst) = exported.moved {
                 notes.push(format!(
                     "{count} directions are not of whole degrees: the names are up to {worst:.2} degrees off"

@@ -1,7 +1,7 @@
 //! `import`: a dataset of measured data, or a file of published coefficients.
 
-use super::common::{Threads, check_applies, check_output};
-use super::parse;
+use super::common::Threads;
+use super::exchange::{self, check_applies, check_output};
 use crate::data::dataset::Sample;
 use crate::data::picture;
 use crate::error::{Result, ToolError};
@@ -11,23 +11,22 @@ use crate::foreign::{self, ImportOptions, Kind, btf, images};
 use crate::format::write;
 use crate::methods::sparse_ensemble::sparsebtf;
 use crate::progress::Progress;
-use crate::show::demo;
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 
 /// Options of the command.
 #[derive(Args)]
 pub struct Arguments {
-    /// Data, detected by content: a .btf of Bonn (UBO2014); a zip (UBO2003, ATRIUM) or a folder (UTIA) with
-    /// images named tlTTT plPPP tvTTT pvPPP (.exr, .png, .jpg, .hdr), or a folder with a dataset.json that
-    /// lists them; or a folder with Coeffs_BTF_NAME_1e-05_{Y,U,V}.bin, DictEnsOrth4D*.bin,
-    /// NAME_mean_std.bin and xyz_loc.bin
+    /// Data, detected by content: a .btf of Bonn (UBO2014); a zip (UBO2003, ATRIUM) or a folder (UTIA) of
+    /// images (.exr, .png, .jpg, .hdr) named tlTTT plPPP tvTTT pvPPP by polar angle and azimuth of light and
+    /// view in degrees, or listed by a dataset.json; or SparseBTF, a folder with
+    /// Coeffs_BTF_NAME_1e-05_{Y,U,V}.bin, DictEnsOrth4D*.bin, NAME_mean_std.bin and xyz_loc.bin
     source: PathBuf,
     /// SparseBTF: the material, if the folder has several
     #[arg(long)]
     material: Option<String>,
     /// SparseBTF: blocks along x and y, if the image is not square, as 40x30
-    #[arg(long, value_parser = parse::blocks)]
+    #[arg(long, value_parser = exchange::blocks)]
     blocks: Option<[usize; 2]>,
     /// SparseBTF: bits of a quantised coefficient, 1 to 16; 10 if not given
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=16))]
@@ -54,17 +53,17 @@ enum Cosine {
 /// Options of a source that becomes a dataset.
 #[derive(Args)]
 pub struct DataArgs {
-    /// Keep 32-bit floats instead of binary16
+    /// Store 32-bit floats instead of binary16
     #[arg(long)]
     float: bool,
-    /// Whether values contain the cosine of the light's angle; if not given, as the data state it, otherwise
-    /// included
+    /// Whether values contain the cosine of the light's polar angle; as the data state it if not given, and
+    /// included if they do not
     #[arg(long, value_enum)]
     cosine: Option<Cosine>,
     /// Name of the material; that of the file or folder if not given
     #[arg(long)]
     name: Option<String>,
-    /// Where the data are from
+    /// Origin of the data
     #[arg(long, default_value = "")]
     origin: String,
     /// Licence of the data
@@ -75,11 +74,11 @@ pub struct DataArgs {
     colours: Option<Colours>,
     /// Memory budget for images held at once, MB; a larger single image is refused
     ///
-    /// 1000 if not given; more memory writes longer runs
+    /// 1000 if not given; a larger budget writes longer runs to disk
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     memory: Option<u32>,
     /// Write the height map of a .btf to an .exr, values unchanged
-    #[arg(long, value_parser = parse::exr)]
+    #[arg(long, value_parser = exchange::exr)]
     height_map: Option<PathBuf>,
     /// Report how long each step took
     #[arg(long)]
@@ -108,7 +107,10 @@ impl DataArgs {
     }
 }
 
-/// Imports what the content of the source says it is.
+/// Imports a source by what its content is.
+///
+/// # Errors
+/// If options do not apply to that kind of source, the data are damaged, and on I/O.
 pub fn run(args: Arguments) -> Result<u8> {
     match foreign::detect(&args.source)? {
         Kind::SparseBtf => {
@@ -216,7 +218,7 @@ fn import_coefficients(args: &Arguments) -> Result<()> {
         }
         (_, there) => return Err(ToolError::Usage(format!("--material says which: {}", there.join(", ")))),
     };
-    let value_bits = args.value_bits.unwrap_or(demo::VALUE_BITS);
+    let value_bits = args.value_bits.unwrap_or(sparsebtf::VALUE_BITS);
     let model = sparsebtf::read_material(folder, &name, args.blocks)?.to_model(value_bits)?;
     let Some(dictionary) = &args.dictionary else {
         return files::write(output, &write::write_material(&model));

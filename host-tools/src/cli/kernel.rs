@@ -13,7 +13,7 @@ pub struct Arguments {
     /// Folder for the files; without it the WGSL goes to stdout
     #[arg(long)]
     out: Option<PathBuf>,
-    /// Only these methods; all if not given
+    /// Include this method; may be given several times. All if not given
     #[arg(long = "method", value_name = "NAME")]
     methods: Vec<String>,
 }

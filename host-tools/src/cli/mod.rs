@@ -3,36 +3,49 @@
 //! Exit codes: 0 good, 1 bad usage, 2 I/O, 3 invalid file, 4 over limits, 5 unsupported. One file a command,
 //! with its options and what it does with them.
 
+#[cfg(feature = "report")]
 mod bench;
 mod blend;
 mod common;
 mod compare;
 mod conform;
 mod decode;
+#[cfg(feature = "import")]
 mod demo;
 mod encode;
+#[cfg(feature = "import")]
+mod exchange;
 mod explain;
+#[cfg(feature = "import")]
 mod export;
+#[cfg(feature = "import")]
 mod import;
 mod info;
 mod kernel;
+#[cfg(not(all(feature = "import", feature = "report")))]
+mod lacking;
 mod parse;
+#[cfg(feature = "report")]
 mod report;
 mod synth;
 mod train;
 mod trim;
 mod validate;
 
+#[cfg(not(feature = "report"))]
+use lacking::{bench, report};
+#[cfg(not(feature = "import"))]
+use lacking::{demo, export, import};
+
 use crate::error::Result;
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 
-/// Compressed measured materials: import, check, decode.
+/// Compressed measured materials (BTFs): import, train, encode, validate, decode, measure.
 #[derive(Parser)]
 #[command(
     version,
-    about,
-    after_help = "Exit codes: 0 good, 1 bad usage, 2 I/O, 3 invalid file, 4 over limits, 5 unsupported."
+    after_help = "Exit codes: 0 success, 1 usage, 2 I/O, 3 invalid file, 4 over limits, 5 unsupported."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -44,19 +57,20 @@ const COMPARE_CODES: &str =
 
 #[derive(Subcommand)]
 enum Command {
-    /// Everything on a built-in material: files, checks, pictures and a page
+    /// Run everything on built-in data: model, train, encode, import, validate, decode on CPU and GPU, and
+    /// show it on a page
     Demo(demo::Arguments),
     /// Convert a .btf, or images in a folder or a zip, to a dataset; or published SparseBTF coefficients to a
     /// file, without re-encoding
     Import(import::Arguments),
     /// Render a BTF of a modelled mesostructure into a dataset
     Synth(synth::Arguments),
-    /// Write a dataset or a decoded file in a third-party format: folders of EXR or PNG, a zip as UBO2003, a
+    /// Write a dataset or a decoded file in a third-party format: a folder of EXR or PNG, a zip as UBO2003, a
     /// .btf
     Export(export::Arguments),
     /// Train a dictionary ensemble that generalises to other materials
     Train(train::Arguments),
-    /// Encode a dataset for a goal in error, bytes or coefficients
+    /// Encode a dataset to a goal: an error, a size or a number of coefficients
     Encode(Box<encode::Arguments>),
     /// Compare two materials; exit codes as idiff: 0 same, 1 warning, 2 failure, 3 other sizes, 4 unreadable
     #[command(after_help = COMPARE_CODES)]
@@ -65,19 +79,20 @@ enum Command {
     Trim(trim::Arguments),
     /// Blend two materials in coefficient space
     Blend(blend::Arguments),
-    /// Benchmark sampling of files: one core and all, random and coherent, kernel
+    /// Benchmark sampling of files: on one core and on all, random and coherent queries, the kernel
     Bench(bench::Arguments),
-    /// Error against run time: all methods and baselines on datasets, as tables, plots, pictures and a page
+    /// Measure error against run time of all methods and baselines on datasets: tables, plots, pictures and a
+    /// page
     Report(report::Arguments),
     /// Describe a file, a dataset or third-party data
     Info(info::Arguments),
     /// Validate files against the specification and warn about wasteful content; silent when good
     Validate(validate::Arguments),
-    /// Explain a sample: which parts of the file it is the sum of, and what each contributed
+    /// Explain a sample: which parts of the file contribute to it, and how much
     Explain(explain::Arguments),
     /// Run the conformance suite against this decoder or an external program (stdin/stdout)
     Conform(conform::Arguments),
-    /// Write the image for one light and one view as .png or .exr
+    /// Decode the image for one light and one view to a .png or .exr
     Decode(decode::Arguments),
     /// Write the decoder's kernel as WGSL, SPIR-V, MSL, HLSL and GLSL, with its bindings
     Kernel(kernel::Arguments),

@@ -1,7 +1,6 @@
-//! Values of options: sizes, bytes, angles, paths.
+//! Values of options: sizes, bytes, angles, texels.
 
 use selvedge::Direction;
-use std::path::PathBuf;
 
 type Parsed<T> = std::result::Result<T, String>;
 
@@ -13,16 +12,6 @@ pub fn size(text: &str) -> Parsed<[usize; 2]> {
         Some(&[side]) => Ok([side, side]),
         Some(&[width, height]) => Ok([width, height]),
         _ => Err("one number, or two as 128x64, from 1 to 16384".into()),
-    }
-}
-
-/// The path of an EXR.
-pub fn exr(text: &str) -> Parsed<PathBuf> {
-    let path = PathBuf::from(text);
-    if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("exr")) {
-        Ok(path)
-    } else {
-        Err("a path that ends in .exr".into())
     }
 }
 
@@ -42,13 +31,6 @@ pub fn bytes(text: &str) -> Parsed<u64> {
         .filter(|n| (1.0..=4.2e9).contains(n))
         .map(|n| n as u64)
         .ok_or_else(|| "bytes, as 200000, 200k or 1.5M".into())
-}
-
-/// Blocks along both sides of an image, as `40x30`.
-pub fn blocks(text: &str) -> Parsed<[usize; 2]> {
-    let parts: Option<Vec<usize>> =
-        text.split('x').map(|n| n.parse().ok().filter(|n| (1..=1638).contains(n))).collect();
-    parts.and_then(|parts| parts.try_into().ok()).ok_or_else(|| "two numbers from 1 to 1638, as 40x30".into())
 }
 
 /// Angle from the normal and azimuth in degrees, as `30,90`.

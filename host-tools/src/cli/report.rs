@@ -14,7 +14,7 @@ pub struct Arguments {
     /// Datasets
     #[arg(required_unless_present = "stability")]
     datasets: Vec<PathBuf>,
-    /// Measure numerical stability as well; alone if no dataset is given
+    /// Also measure numerical stability; only that if no dataset is given
     #[arg(long)]
     stability: bool,
     /// Folder of the results; an interrupted run is resumed

@@ -11,15 +11,15 @@ use std::path::PathBuf;
 
 #[derive(Args)]
 pub struct Arguments {
-    /// checker, rings, tissue, cloth, knit or hammered
+    /// Mesostructure: checker, rings, tissue, cloth, knit or hammered
     kind: String,
     /// The dataset to write, NAME.selvset
     #[arg(short, long)]
     output: PathBuf,
-    /// Texels along the sides, as 128 or 128x64
+    /// Texels along x and y, as 128 or 128x64
     #[arg(long, default_value = "128", value_parser = parse::size)]
     size: [usize; 2],
-    /// Directions of light and of view each: 81 or 151
+    /// Directions of the light and of the view: 81 or 151 of each
     #[arg(long, default_value_t = 81)]
     directions: usize,
     /// Rays per texel and view: 1, 4, 9 or 16
@@ -28,7 +28,7 @@ pub struct Arguments {
     /// Random seed of the geometry
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// 32-bit floats instead of binary16
+    /// Store 32-bit floats instead of binary16
     #[arg(long)]
     float: bool,
     #[command(flatten)]

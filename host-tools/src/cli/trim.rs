@@ -43,7 +43,7 @@ pub struct Arguments {
     /// Keep lights within this angle from the normal, and optionally between two azimuths: 60 or 60,350,10
     #[arg(long, value_parser = parse_sector)]
     lights: Option<Sector>,
-    /// Keep views, likewise
+    /// Keep views, as --lights
     #[arg(long, value_parser = parse_sector)]
     views: Option<Sector>,
     /// Allow re-triangulation (changes interpolated results)
@@ -66,8 +66,8 @@ pub fn run(args: Arguments) -> Result<u8> {
     let model = with_material(&args.source, |file| {
         // 10.8-3: what is left has the results of the original.
         if !args.retriangulate && !read::same_triangles(&file) {
-            let why = "its triangulation differs from the one that this tool computes, so interpolated results \
-                       would change";
+            let why = "its triangulation differs from the one that this tool computes, so interpolated \
+                       results would change";
             return Err(ToolError::Usage(format!(
                 "{}: {why}; --retriangulate allows it",
                 args.source.file.display()

@@ -10,10 +10,10 @@ use std::path::{Path, PathBuf};
 /// Options of the command.
 #[derive(Args)]
 pub struct Arguments {
-    /// Files, folders with .selv files, - for standard input
+    /// Files, folders of .selv files, or - for standard input
     #[arg(required_unless_present_any = ["rules", "schema"])]
     files: Vec<PathBuf>,
-    /// The external dictionary of the files
+    /// External dictionary of the files
     #[arg(long)]
     dictionary: Option<PathBuf>,
     #[command(flatten)]
@@ -24,16 +24,16 @@ pub struct Arguments {
     /// The same as --format json
     #[arg(long, conflicts_with = "format")]
     json: bool,
-    /// A warning makes a file fail
+    /// Treat warnings as errors
     #[arg(long)]
     warnings_as_errors: bool,
-    /// Override a severity, as W1=off or 3.2-5=warning: off, note, warning, error
+    /// Override the severity of a rule or warning (off, note, warning, error), as W1=off or 3.2-5=warning
     #[arg(long = "severity", value_name = "RULE=SEVERITY", value_parser = parse_severity)]
     severities: Vec<(String, validate::Severity)>,
-    /// List all rules that are checked, and stop
+    /// List all rules and warnings, and exit
     #[arg(long)]
     rules: bool,
-    /// Print the JSON schema of --format json, and stop
+    /// Print the JSON schema of --format json, and exit
     #[arg(long)]
     schema: bool,
 }

@@ -261,7 +261,10 @@ impl Writer {
         [pair % self.description.lights.len(), pair / self.description.lights.len()]
     }
 
-    /// Measures the values, writes the head and puts the file in its place.
+    /// Measures the values, writes the header and puts the file in its place.
+    ///
+    /// # Errors
+    /// If a text of the description is too long, and on I/O; the file that was there before is then as it was.
     pub fn finish(mut self) -> Result<Statistics> {
         let read = Dataset {
             file: self.file.reopen().map_err(ToolError::io(&self.path))?,
@@ -437,6 +440,9 @@ impl Dataset {
     }
 
     /// The image of one pair of directions: `[y][x][colour]`.
+    ///
+    /// # Errors
+    /// As [`Dataset::read`].
     pub fn image(&self, light: usize, view: usize) -> Result<Vec<[f32; 3]>> {
         let pair = view * self.description.lights.len() + light;
         let mut bytes = Vec::new();

@@ -2,7 +2,8 @@
 
 use crate::data::dataset::{Dataset, Description, Sample, Writer};
 use crate::error::Result;
-use crate::measure::compare::{self, Source};
+use crate::measure::compare;
+use crate::measure::radiance::AtLevel;
 use rayon::prelude::*;
 use selvedge::Selvedge;
 use std::path::Path;
@@ -37,7 +38,8 @@ pub fn expand(
     for first in (0..pairs).step_by(batch) {
         let count = batch.min(pairs - first);
         let image = |i: usize| {
-            compare::image(Source::File(file, 0), &description, (first + i) % lights, (first + i) / lights)
+            let pair = first + i;
+            compare::image(&AtLevel::finest(file), &description, pair % lights, pair / lights)
         };
         let images = (0..count).into_par_iter().map(image).collect::<Result<Vec<_>>>()?;
         writer.put_images(first, &images)?;

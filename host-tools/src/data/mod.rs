@@ -3,6 +3,7 @@
 pub mod dataset;
 pub mod directions;
 pub mod expand;
+pub mod pass;
 pub mod picture;
 pub mod pyramid;
 pub mod transfer;

@@ -16,6 +16,7 @@ pub struct Picture {
 }
 
 /// The sRGB transfer, to 8 bits.
+#[cfg(feature = "png")]
 fn to_srgb8(linear: f32) -> u8 {
     let c = linear.clamp(0.0, 1.0);
     let encoded = if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 };
@@ -101,6 +102,7 @@ impl Picture {
     }
 
     /// Bytes of an 8-bit sRGB PNG.
+    #[cfg(feature = "png")]
     pub fn to_png(&self) -> Vec<u8> {
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, self.width as u32, self.height as u32);
@@ -115,6 +117,7 @@ impl Picture {
     }
 
     /// Bytes of an EXR with 32-bit floats: the decoder's bits, unchanged.
+    #[cfg(feature = "import")]
     pub fn to_exr(&self) -> Vec<u8> {
         use exr::prelude::{Image, SpecificChannels, WritableImage as _};
         let pixel = |at: exr::math::Vec2<usize>| {
@@ -128,10 +131,24 @@ impl Picture {
     }
 
     /// Writes a PNG or an EXR, by the name's ending.
+    ///
+    /// # Errors
+    /// [`ToolError::Usage`] for any other ending; [`ToolError::Feature`] in a build without the feature
+    /// `import`; on I/O.
     pub fn save(&self, path: &Path) -> Result<()> {
+        files::write(path, &self.encoded(path)?)
+    }
+
+    fn encoded(&self, path: &Path) -> Result<Vec<u8>> {
         match path.extension().and_then(|ending| ending.to_str()).map(str::to_ascii_lowercase).as_deref() {
-            Some("png") => files::write(path, &self.to_png()),
-            Some("exr") => files::write(path, &self.to_exr()),
+            #[cfg(feature = "png")]
+            Some("png") => Ok(self.to_png()),
+            #[cfg(feature = "import")]
+            Some("exr") => Ok(self.to_exr()),
+            #[cfg(not(feature = "png"))]
+            Some("png") => Err(ToolError::lacking(&path.display().to_string(), "import")),
+            #[cfg(not(feature = "import"))]
+            Some("exr") => Err(ToolError::lacking(&path.display().to_string(), "import")),
             _ => Err(ToolError::Usage(format!("{}: pictures end in .png or .exr", path.display()))),
         }
     }

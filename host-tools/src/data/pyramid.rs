@@ -6,6 +6,9 @@ use rayon::prelude::*;
 use std::path::Path;
 
 /// Writes the next level: each texel is the mean of the up to four that it covers.
+///
+/// # Errors
+/// If the data cannot be read, or the level not be written.
 pub fn next_level(dataset: &Dataset, path: &Path) -> Result<Dataset> {
     let fine = dataset.description();
     let [width, height] = fine.size;
@@ -35,6 +38,9 @@ pub fn next_level(dataset: &Dataset, path: &Path) -> Result<Dataset> {
 }
 
 /// All levels from the second on, in a folder for temporary files.
+///
+/// # Errors
+/// As [`next_level`].
 pub fn levels(dataset: &Dataset, count: usize, folder: &Path) -> Result<Vec<Dataset>> {
     let mut levels: Vec<Dataset> = Vec::new();
     for level in 1..count {

@@ -4,7 +4,9 @@
 //! is orthonormal, an error of the channels is an error of the colours of equal size, so that what is spent
 //! on one channel can be weighed against what is saved in another.
 
+use crate::data::dataset::Dataset;
 use crate::format::model::TransferModel;
+use std::f32::consts::LN_2;
 
 /// Red, green, blue from the channels: grey, red against blue, green against both.
 const CHANNELS_TO_RGB: [[f64; 3]; 3] = [
@@ -32,6 +34,41 @@ pub fn log2(x: f32) -> f32 {
     let s2 = s * s;
     let series = 2.885_39 + s2 * (0.961_796_7 + s2 * (0.577_078 + s2 * (0.412_198_6 + s2 * 0.320_598_9)));
     exponent as f32 + s * series
+}
+
+/// Domain in which radiance is decomposed, coded, or judged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Domain {
+    /// `ln(x + e)`, with the dataset's offset `e`.
+    Log,
+    /// `x` itself.
+    Linear,
+}
+
+impl Domain {
+    /// A radiance in this domain.
+    #[inline(always)]
+    pub fn forward(self, x: f32, offset: f32) -> f32 {
+        if self == Domain::Log { LN_2 * log2(x + offset) } else { x }
+    }
+
+    /// Radiance again.
+    #[inline(always)]
+    pub fn back(self, y: f32, offset: f32) -> f32 {
+        (if self == Domain::Log { y.exp() - offset } else { y }).max(0.0)
+    }
+}
+
+/// The transfer and offset that a domain is coded with.
+pub fn transfer_of(data: &Dataset, domain: Domain) -> TransferModel {
+    let statistics = data.statistics();
+    match domain {
+        Domain::Log => TransferModel::Log2 { offset: statistics.coded_offset() },
+        // Values below 16, so that a texture is far below its bound.
+        Domain::Linear => TransferModel::Linear {
+            exponent: (statistics.largest.max(1e-30).log2().ceil() as i32 - 4).clamp(-60, 60),
+        },
+    }
 }
 
 /// Radiance to channels.

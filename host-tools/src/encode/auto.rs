@@ -2,8 +2,8 @@
 
 use super::encoder::{Attempts, Common, Encoded, Encoder, Levels};
 use super::goal::{Goal, rms_of};
+use crate::data::transfer::Domain;
 use crate::error::{Result, ToolError};
-use crate::measure::baseline::pca::Domain;
 use crate::progress::Observer;
 
 /// What the best of several files is.
@@ -156,10 +156,12 @@ mod tests {
             reached.into_iter().next()
         }
 
+        #[cfg(feature = "cli")]
         fn arguments(&self, command: clap::Command) -> clap::Command {
             command
         }
 
+        #[cfg(feature = "cli")]
         fn configured(&self, _: &clap::ArgMatches) -> Result<Box<dyn Encoder>> {
             Err(ToolError::Usage("no options".into()))
         }

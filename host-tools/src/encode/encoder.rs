@@ -2,8 +2,8 @@
 
 use super::goal::{Goal, domain_name};
 use crate::data::dataset::Dataset;
+use crate::data::transfer::Domain;
 use crate::error::{Result, ToolError};
-use crate::measure::baseline::pca::Domain;
 use crate::measure::compare::Metrics;
 use crate::progress::Observer;
 use serde::ser::{Serialize, SerializeMap as _, Serializer};
@@ -164,12 +164,14 @@ pub trait Encoder: Sync {
     fn choose(&self, goal: Goal, reached: Vec<Encoded>) -> Option<Encoded>;
 
     /// Adds the method's options to a command, under a heading of their own.
+    #[cfg(feature = "cli")]
     fn arguments(&self, command: clap::Command) -> clap::Command;
 
     /// The encoder with the options of a command line.
     ///
     /// # Errors
     /// If a file that an option names cannot be read.
+    #[cfg(feature = "cli")]
     fn configured(&self, matches: &clap::ArgMatches) -> Result<Box<dyn Encoder>>;
 }
 

@@ -5,11 +5,11 @@
 //! domain that was asked for.
 
 use crate::data::dataset::Dataset;
+use crate::data::transfer::Domain;
 use crate::error::{Result, ToolError};
-use crate::measure::baseline::pca::Domain;
-use crate::measure::compare::{Metrics, Source, compare_every};
+use crate::measure::compare::Metrics;
+use crate::measure::verify::verify;
 use crate::progress::Observer;
-use selvedge::{Limits, Selvedge};
 use std::ops::RangeInclusive;
 
 /// What a file has to reach, as decoded.
@@ -184,34 +184,4 @@ pub fn meet<E: AsRef<[u8]>>(
         goal: goal.to_string(),
         least: format!("the least error that was reached is {least:.6}, and {limit:.6} is asked for"),
     })
-}
-
-/// Opens what an encoder made: that it breaks a rule is the encoder's fault.
-///
-/// # Errors
-/// [`ToolError::Mismatch`] if it does.
-pub fn open_made<'a>(bytes: &'a [u8], dictionary: Option<&'a [u8]>) -> Result<Selvedge<'a>> {
-    let opened = selvedge::open_with(bytes, dictionary, &Limits::NONE);
-    opened.map_err(|finding| {
-        ToolError::Mismatch(format!("the encoder wrote a file that breaks a rule: {finding}"))
-    })
-}
-
-/// Decodes what an encoder made of some data, at every texel and every N-th light: errors, and the operations
-/// that it states.
-///
-/// # Errors
-/// If it breaks a rule, or data cannot be read.
-pub fn verify(
-    data: &Dataset,
-    bytes: &[u8],
-    dictionary: Option<&[u8]>,
-    every: usize,
-    progress: &dyn Fn(usize, usize),
-) -> Result<(Metrics, u32)> {
-    let file = open_made(bytes, dictionary)?;
-    let (offset, peak) = (data.statistics().log_offset(), Some(data.statistics().largest as f64));
-    let (reference, decoded) = (Source::Data(data), Source::File(&file, 0));
-    let metrics = compare_every(every, reference, decoded, data.description(), offset, peak, progress)?;
-    Ok((metrics, file.header().operations))
 }

@@ -1,11 +1,11 @@
-//! Bytes of a foreign file: read where they are, never more than there are, and every failure with its place.
+//! Bytes of a third-party file: read at offsets, never beyond the end, and every failure with its offset.
 
 use crate::error::{Result, ToolError};
 use crate::files::read_exact_at;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-/// The widths that numbers of foreign files have.
+/// The widths that numbers of third-party files have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Width {
     /// IEEE binary16.
@@ -23,7 +23,7 @@ enum Store {
     Memory(Vec<u8>),
 }
 
-/// A foreign file that is read at offsets, by any thread.
+/// A third-party file that is read at offsets, by any thread.
 #[derive(Debug)]
 pub struct Bytes {
     store: Store,
@@ -57,8 +57,8 @@ impl Bytes {
         &self.path
     }
 
-    /// That something is wrong at an offset.
-    pub fn fail<T>(&self, offset: u64, what: impl Into<String>) -> Result<T> {
+    /// The error that something is wrong at an offset.
+    pub(super) fn fail<T>(&self, offset: u64, what: impl Into<String>) -> Result<T> {
         Err(ToolError::Foreign { path: self.path.clone(), offset, what: what.into() })
     }
 
@@ -77,7 +77,7 @@ impl Bytes {
         }
     }
 
-    /// That `length` bytes are there from an offset on.
+    /// Checks that `length` bytes are there from an offset on.
     fn check(&self, offset: u64, length: u64, what: &str) -> Result<()> {
         if offset.checked_add(length).is_none_or(|end| end > self.length) {
             return self.fail(
@@ -128,17 +128,17 @@ impl Bytes {
     }
 }
 
-/// A place in a file that moves on as fields are read.
-pub struct Cursor<'a> {
+/// A position in a file that advances as fields are read.
+pub(super) struct Cursor<'a> {
     /// The file.
-    pub bytes: &'a Bytes,
+    pub(super) bytes: &'a Bytes,
     /// Offset of the next field.
-    pub at: u64,
+    pub(super) at: u64,
 }
 
 impl Cursor<'_> {
-    /// That something is wrong with the field that was read last, of so many bytes.
-    pub fn fail<T>(&self, length: u64, what: impl Into<String>) -> Result<T> {
+    /// The error that something is wrong with the field that was read last, of so many bytes.
+    pub(super) fn fail<T>(&self, length: u64, what: impl Into<String>) -> Result<T> {
         self.bytes.fail(self.at - length, what)
     }
 
@@ -151,23 +151,23 @@ impl Cursor<'_> {
     }
 
     /// A byte.
-    pub fn u8(&mut self, what: &str) -> Result<u8> {
+    pub(super) fn u8(&mut self, what: &str) -> Result<u8> {
         self.field::<1>(what).map(|[byte]| byte)
     }
 
     /// Four bytes.
-    pub fn u32(&mut self, what: &str) -> Result<u32> {
+    pub(super) fn u32(&mut self, what: &str) -> Result<u32> {
         self.field(what).map(u32::from_le_bytes)
     }
 
     /// A finite number.
-    pub fn f32(&mut self, what: &str) -> Result<f32> {
+    pub(super) fn f32(&mut self, what: &str) -> Result<f32> {
         let number = self.field(what).map(f32::from_le_bytes)?;
         if number.is_finite() { Ok(number) } else { self.fail(4, format!("{what}: {number}")) }
     }
 
     /// `N` finite numbers.
-    pub fn floats<const N: usize>(&mut self, what: &str) -> Result<[f32; N]> {
+    pub(super) fn floats<const N: usize>(&mut self, what: &str) -> Result<[f32; N]> {
         let mut numbers = [0.0; N];
         for number in &mut numbers {
             *number = self.f32(what)?;
@@ -176,7 +176,7 @@ impl Cursor<'_> {
     }
 
     /// A width of numbers: 2, 4 or 8.
-    pub fn width(&mut self) -> Result<Width> {
+    pub(super) fn width(&mut self) -> Result<Width> {
         match self.u8("size of a number")? {
             2 => Ok(Width::Half),
             4 => Ok(Width::Single),
@@ -186,25 +186,25 @@ impl Cursor<'_> {
     }
 
     /// A text of `length` bytes without its padding, of which the first 200 characters are kept.
-    pub fn text(&mut self, length: u32, what: &str) -> Result<String> {
+    pub(super) fn text(&mut self, length: u32, what: &str) -> Result<String> {
         let mut bytes = vec![0; length.min(1024) as usize];
         let start = self.at;
         self.skip(length as u64, what)?;
         self.bytes.read_at(start, &mut bytes)?;
         let text = String::from_utf8_lossy(&bytes);
         let text = text.split('\0').next().unwrap_or_default();
-        Ok(super::clean(text))
+        Ok(super::options::clean(text))
     }
 
-    /// Goes on behind `length` bytes, which must be there.
-    pub fn skip(&mut self, length: u64, what: &str) -> Result<()> {
+    /// Skips `length` bytes, which must be there.
+    pub(super) fn skip(&mut self, length: u64, what: &str) -> Result<()> {
         self.bytes.check(self.at, length, what)?;
         self.at += length;
         Ok(())
     }
 
-    /// Goes on behind a table of `rows` times `columns` numbers, which must be there; where it begins.
-    pub fn table(&mut self, rows: u64, columns: u64, width: Width, what: &str) -> Result<u64> {
+    /// Skips a table of `rows` times `columns` numbers, which must be there; its start.
+    pub(super) fn table(&mut self, rows: u64, columns: u64, width: Width, what: &str) -> Result<u64> {
         let start = self.at;
         match rows.checked_mul(columns).and_then(|n| n.checked_mul(width as u64)) {
             Some(length) => self.skip(length, what)?,

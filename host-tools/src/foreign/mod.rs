@@ -1,111 +1,40 @@
-//! Materials in the formats of others: what a path holds, by its content, and a dataset of it.
+//! Materials in third-party formats: what a path holds, by its content, and a dataset of it.
 //!
 //! | module | does |
 //! |---|---|
 //! | [`btf`] | the containers of Bonn, `.btf` |
-//! | [`images`], [`archive`], [`pixels`] | sets of images in folders and zip archives (UBO2003, ATRIUM, UTIA), and the single image |
+//! | [`images`], [`archive`], [`pixels`] | sets of images in folders and zip archives, and the single image |
 //! | [`ubo`] | a set of images in the layout of UBO2003 |
 //! | [`bytes`] | a file that is read at offsets and never trusted |
 //!
-//! The files of SparseBTF have a module of their own, [`crate::methods::sparse_ensemble::sparsebtf`]: they are not expanded but taken
-//! over as they are.
+//! The files of SparseBTF have a module of their own, [`crate::methods::sparse_ensemble::sparsebtf`]: they are
+//! imported without re-encoding.
 
 pub mod archive;
 pub mod btf;
 pub mod bytes;
 pub mod images;
+mod options;
 pub mod pixels;
 pub mod ubo;
+
+pub use options::{ImportOptions, Imported, clean};
 
 use crate::data::dataset::{Dataset, Description, Sample, Statistics, Writer, first_beyond};
 use crate::data::directions;
 use crate::error::{Result, ToolError};
 use crate::format::container::is_dictionary;
-use crate::math::linear::ordered;
 use crate::methods::sparse_ensemble::sparsebtf;
+use crate::work::ordered;
 use btf::Btf;
 use glam::DVec3;
 use images::ImageSet;
-use pixels::Colours;
+use options::Clipped;
 use serde::Serialize;
 use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
-
-/// What the user asks of an import, and what it cannot find in the data.
-#[derive(Clone, Debug)]
-pub struct ImportOptions {
-    /// How values are stored.
-    pub sample: Sample,
-    /// Whether values contain the cosine of the light's angle; if it is not said, as the data say, and if
-    /// they do not, yes.
-    pub cosine_included: Option<bool>,
-    /// Name of the material; if empty, that of the data.
-    pub name: String,
-    /// Origin of the data; if empty, that of the data.
-    pub origin: String,
-    /// Licence of the data; if empty, that of the data.
-    pub licence: String,
-    /// Bytes for the images held at once. A single image that needs more than this, or than a megabyte, is
-    /// refused.
-    pub memory: usize,
-    /// What the three numbers of an image are.
-    pub colours: Colours,
-}
-
-impl Default for ImportOptions {
-    fn default() -> ImportOptions {
-        let [name, origin, licence] = Default::default();
-        ImportOptions {
-            sample: Sample::Half,
-            cosine_included: None,
-            name,
-            origin,
-            licence,
-            memory: 1 << 30,
-            colours: Colours::Auto,
-        }
-    }
-}
-
-impl ImportOptions {
-    /// Why a value cannot be stored.
-    fn refusal(&self, value: f32) -> String {
-        let hint = if value.is_finite() && self.sample == Sample::Half { "; --float holds it" } else { "" };
-        format!("{value} is not a radiance from 0 to {:e}{hint}", self.sample.largest())
-    }
-
-    /// A description of data, completed by what the user says.
-    fn describe(&self, found: &Description) -> Description {
-        let asked = [&self.name, &self.origin, &self.licence];
-        let texts =
-            std::array::from_fn(
-                |i| if asked[i].is_empty() { clean(&found.texts[i]) } else { asked[i].clone() },
-            );
-        let cosine_included = self.cosine_included.unwrap_or(found.cosine_included);
-        Description { sample: self.sample, cosine_included, texts, ..found.clone() }
-    }
-}
-
-/// A text of others as a file may have it (3.4-3): without what is not seen, and not long.
-pub fn clean(text: &str) -> String {
-    text.chars()
-        .filter(|&c| !selvedge::container::metadata::is_invisible(c))
-        .take(200)
-        .collect::<String>()
-        .trim()
-        .to_owned()
-}
-
-/// What came of an import.
-#[derive(Clone, Debug)]
-pub struct Imported {
-    /// Of the dataset.
-    pub statistics: Statistics,
-    /// What the user should know: a line each.
-    pub notes: Vec<String>,
-}
 
 /// What a path holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -141,7 +70,7 @@ impl std::fmt::Display for Kind {
     }
 }
 
-/// Says what a path holds, by its content and not by its name.
+/// What a path holds, by its content and not by its name.
 ///
 /// # Errors
 /// If it is none of the kinds, and on I/O.
@@ -169,7 +98,7 @@ pub fn detect(path: &Path) -> Result<Kind> {
     }
 }
 
-/// Makes a dataset of a `.btf`, batch by batch of texels; `progress` hears how many of how many texels are
+/// Makes a dataset of a `.btf`, batch by batch of texels; `progress` gets how many of how many texels are
 /// done.
 ///
 /// # Errors
@@ -231,31 +160,19 @@ pub fn import_btf(
         match head.cosine_included {
             Some(true) => {}
             // The flag is not to be trusted: Bonn's own library leaves it 0 for pictures, which are radiance.
-            Some(false) => notes.push("the file says that values do not contain the cosine of the light's angle; --cosine included if they do".into()),
-            None => notes.push("the file does not say whether values contain the cosine of the light's angle; taken as if they do (--cosine)".into()),
+            Some(false) => notes.push(
+                "the file says that values do not contain the cosine of the light's angle; --cosine included \
+                 if they do"
+                    .into(),
+            ),
+            None => notes.push(
+                "the file does not say whether values contain the cosine of the light's angle; taken as if \
+                 they do (--cosine)"
+                    .into(),
+            ),
         }
     }
     Ok(Imported { statistics: writer.finish()?, notes })
-}
-
-/// Negative values that became 0.
-#[derive(Clone, Copy, Default)]
-struct Clipped {
-    count: u64,
-    least: f32,
-}
-
-impl Clipped {
-    /// Makes them 0. Infinities and NaN are left to be refused.
-    fn of(values: &mut [f32]) -> Clipped {
-        let mut clipped = Clipped::default();
-        values.iter_mut().filter(|v| **v < 0.0 && v.is_finite()).for_each(|v| {
-            clipped.count += 1;
-            clipped.least = clipped.least.min(*v);
-            *v = 0.0;
-        });
-        clipped
-    }
 }
 
 impl Btf {
@@ -291,7 +208,7 @@ fn known_grid(set: &[DVec3]) -> Vec<DVec3> {
     directions::grid(set.len()).filter(is_grid).unwrap_or_else(|| set.to_vec())
 }
 
-/// What a path of others holds, for `info`.
+/// What a path with third-party data holds, for `info`.
 #[derive(Debug, Serialize)]
 pub struct ForeignInfo {
     /// Which kind it is.
@@ -302,7 +219,7 @@ pub struct ForeignInfo {
     pub size: [usize; 2],
     /// Light and view directions.
     pub directions: [usize; 2],
-    /// The light's cosine is in the values, as the data say or as is usual.
+    /// The light's cosine is in the values, as the data state or by default.
     pub cosine_included: bool,
     /// Width and height of a texel in nanometres, 0 if unknown.
     pub texel_nm: [u32; 2],
@@ -312,7 +229,7 @@ pub struct ForeignInfo {
     pub dataset_bytes: u64,
     /// Mean, least and largest value, where they are known without reading all.
     pub statistics: Option<Statistics>,
-    /// What stands in the head of a `.btf`.
+    /// The header of a `.btf`.
     pub btf: Option<btf::Head>,
 }
 
@@ -341,7 +258,8 @@ impl ForeignInfo {
             format!("{} x {} nm", self.texel_nm[0], self.texel_nm[1])
         };
         let mut text = format!(
-            "{}\n  format      {}\n  origin      {}\n  licence     {}\n  size        {} x {} texels of {texel}\n  directions  {} light, {} view\n  cosine      {}\n  dataset     {} bytes in binary16\n",
+            "{}\n  format      {}\n  origin      {}\n  licence     {}\n  size        {} x {} texels of {texel}\n  \
+             directions  {} light, {} view\n  cosine      {}\n  dataset     {} bytes in binary16\n",
             known(&self.texts[0]),
             self.format,
             known(&self.texts[1]),
@@ -378,7 +296,7 @@ impl ForeignInfo {
     }
 }
 
-/// Says what a path of others holds; of a set of images, the first alone is looked into.
+/// Describes what a path with third-party data holds; of a set of images, only the first is opened.
 ///
 /// # Errors
 /// If it is not as its format says, and on I/O.

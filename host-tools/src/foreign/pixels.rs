@@ -1,12 +1,12 @@
-//! Single images of measured materials, read as linear RGB: EXR, PNG, JPEG and Radiance pictures, told apart
-//! by their content.
+//! Single images of measured materials, read as linear RGB: EXR, PNG, JPEG and Radiance pictures,
+//! detected by content.
 //!
 //! | kind | read |
 //! |---|---|
-//! | EXR | first layer; R, G, B, or X, Y, Z, or Y alone; 16 or 32-bit floats, linear; the data window is the image |
-//! | PNG | 8 or 16 bits, grey or RGB, as sRGB whatever profile it carries; alpha is ignored, palettes are refused |
+//! | EXR | first layer; R, G, B, or X, Y, Z, or Y; 16 or 32-bit floats, linear; the data window is the image |
+//! | PNG | 8 or 16 bits, grey or RGB, as sRGB whatever its profile; alpha is ignored, palettes are refused |
 //! | JPEG | 8 bits, grey or colour, as sRGB |
-//! | Radiance | RGBE or XYZE, divided by its `EXPOSURE`; rows from the top (`-Y h +X w`), from the bottom (`+Y h +X w`), or as the ATRIUM archives have them |
+//! | Radiance | RGBE or XYZE, divided by its `EXPOSURE`; rows from the top (`-Y h +X w`), the bottom (`+Y h +X w`), or as ATRIUM |
 //!
 //! A Radiance picture of the ATRIUM archives says `+X 256 -Y 256`, which by Radiance's own rules would be
 //! columns. Its data are rows from the bottom, by the one reader that was written against the archives
@@ -33,7 +33,8 @@ const XYZ: [[f32; 3]; 3] = [
 ];
 
 /// What the three numbers of an image are.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Colours {
     /// As the image says: XYZ where its channels are called so, else RGB.
     #[default]

@@ -1,7 +1,7 @@
 //! A material in memory, quantised: exactly what a file holds, before layout, checksums and cost.
 //!
 //! Whoever makes a file (an importer, an encoder, a generator of test files) fills a [`MaterialModel`];
-//! [`crate::format::write`] turns it into bytes. All numbers have the meaning of the specification.
+//! [`write`](super::write) turns it into bytes. All numbers have the meaning of the specification.
 
 use crate::format::texture::Texture;
 use selvedge::kernel::material::{CHANNEL_FULL, CHANNEL_MEAN, CHANNEL_MISSING};

@@ -10,7 +10,7 @@ use std::fmt::Debug;
 /// The texture of a material: what its method adds to means and scales, quantised.
 ///
 /// Sizes, levels, layers, directions and the edge of a block are the model's
-/// ([`crate::format::model::MaterialModel`]); a texture has the same of them.
+/// ([`MaterialModel`](super::model::MaterialModel)); a texture has the same of them.
 pub trait Texture: Any + Debug + Send + Sync {
     /// Number of the method in the header (3.1-8).
     fn method(&self) -> u32;

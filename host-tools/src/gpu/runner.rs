@@ -109,6 +109,9 @@ pub struct Loaded {
 
 impl Gpu {
     /// The best adapter there is: a native one, else GL, else `None`.
+    ///
+    /// # Errors
+    /// As [`Gpu::new`].
     pub fn any() -> Result<Option<Gpu>> {
         match Gpu::new(wgpu::Backends::PRIMARY)? {
             Some(gpu) => Ok(Some(gpu)),
@@ -117,6 +120,9 @@ impl Gpu {
     }
 
     /// The first adapter of the backends; `None` if there is none. A software adapter will do.
+    ///
+    /// # Errors
+    /// [`ToolError::Kernel`] if the adapter gives no device.
     pub fn new(backends: wgpu::Backends) -> Result<Option<Gpu>> {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
         descriptor.backends = backends;
@@ -284,7 +290,10 @@ impl Gpu {
         Ok(bytemuck::cast_slice(&mapped).to_vec())
     }
 
-    /// Answers of `texel`, `filtered`, `trilinear` or `floats`, one for each query.
+    /// Answers of `texel`, `filtered`, `trilinear` or `floats`, one for each query, in their order.
+    ///
+    /// # Errors
+    /// [`ToolError::Kernel`] if there is no such entry point, or the device fails.
     pub fn answer(&self, loaded: &Loaded, entry: &str, queries: &[Query]) -> Result<Vec<Answer>> {
         let mut answers = Vec::with_capacity(queries.len());
         // A dispatch of at most 2^16 - 1 groups of 64; smaller ones keep watchdogs of real devices quiet.
@@ -301,6 +310,9 @@ impl Gpu {
     }
 
     /// A whole image of `size` texels, row by row, for the material and directions of a query.
+    ///
+    /// # Errors
+    /// [`ToolError::Kernel`] if the device fails.
     pub fn image(&self, loaded: &Loaded, query: Query, size: [u32; 2]) -> Result<Vec<Answer>> {
         self.run(loaded, "image", &[query], (size[0] * size[1]) as usize, size.map(|s| s.div_ceil(8)))
     }

@@ -4,8 +4,9 @@
 //! of a whole decomposition (both Rubinstein et al. 2008). Everything adds up in a fixed order, so that no
 //! bit depends on the number of threads.
 
-use crate::math::linear::{ordered, product_bt};
+use crate::math::linear::product_bt;
 use crate::math::random::Random;
+use crate::work::ordered;
 
 /// Samples coded at once.
 const BATCH: usize = 128;

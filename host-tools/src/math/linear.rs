@@ -7,7 +7,6 @@ use faer::linalg::matmul::matmul;
 use faer::linalg::solvers::Solve as _;
 use faer::{Accum, Mat, MatMut, MatRef, Par, Side};
 use half::slice::HalfFloatSliceExt as _;
-use rayon::prelude::*;
 
 /// `out = a * b` (or `out += a * b`) of matrices with any strides.
 pub fn multiply(out: MatMut<'_, f32>, a: MatRef<'_, f32>, b: MatRef<'_, f32>, add: bool) {
@@ -172,35 +171,6 @@ pub fn solve_symmetric(matrix: impl Fn(usize, usize) -> f64, right: &[f64], n: u
     let solution = factor.map(|factor| factor.solve(&right));
     clean_registers();
     solution
-}
-
-/// Items worked on at once between two ordered additions.
-pub const WAVE: usize = 16;
-
-/// `fold(total, work(i))` for `i` ascending, the work in parallel: the same bits for any number of threads.
-pub fn ordered<T: Send, E: Send, A>(
-    count: usize,
-    work: impl Fn(usize) -> Result<T, E> + Sync,
-    total: A,
-    fold: impl FnMut(&mut A, usize, T),
-) -> Result<A, E> {
-    ordered_in(WAVE, count, work, total, fold)
-}
-
-/// As [`ordered`], with at most `wave` results in memory: the same bits for any number of them.
-pub fn ordered_in<T: Send, E: Send, A>(
-    wave: usize,
-    count: usize,
-    work: impl Fn(usize) -> Result<T, E> + Sync,
-    mut total: A,
-    mut fold: impl FnMut(&mut A, usize, T),
-) -> Result<A, E> {
-    for first in (0..count).step_by(wave) {
-        let results: Vec<T> =
-            (first..(first + wave).min(count)).into_par_iter().map(&work).collect::<Result<_, E>>()?;
-        results.into_iter().enumerate().for_each(|(i, result)| fold(&mut total, first + i, result));
-    }
-    Ok(total)
 }
 
 #[cfg(test)]

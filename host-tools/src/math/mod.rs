@@ -2,4 +2,5 @@
 
 pub mod ksvd;
 pub mod linear;
+pub mod pca;
 pub mod random;

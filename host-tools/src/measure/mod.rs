@@ -2,5 +2,7 @@
 
 pub mod baseline;
 pub mod compare;
+pub mod radiance;
 pub mod similarity;
 pub mod speed;
+pub mod verify;

@@ -1,15 +1,28 @@
 //! The list of methods, and the ways to find one.
 
 use crate::error::{Result, ToolError};
-use crate::methods::{method::Method, sparse_ensemble, sparse_tensor};
+use crate::methods::method::Method;
 use selvedge::{Finding, Part, Rule, Selvedge};
 
-/// Every method of the tools, by number.
-#[rustfmt::skip]
-pub const METHODS: &[&Method] = &[
-    &sparse_ensemble::METHOD,
-    &sparse_tensor::METHOD,
-];
+/// Hands a macro the modules of the methods by number, a line each. Each has a `METHOD` and, in `encode`, an
+/// `ENCODER`.
+macro_rules! each_method {
+    ($then:ident) => {
+        $then! {
+            sparse_ensemble
+            sparse_tensor
+        }
+    };
+}
+pub(crate) use each_method;
+
+macro_rules! methods {
+    ($($module:ident)*) => {
+        /// Every method of the tools, by number.
+        pub const METHODS: &[&Method] = &[$(&crate::methods::$module::METHOD),*];
+    };
+}
+each_method!(methods);
 
 /// Byte of a header that has the method (3.1).
 const METHOD_OFFSET: u32 = 20;

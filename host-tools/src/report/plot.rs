@@ -1,26 +1,31 @@
 //! Plots as SVG: an error over a cost, both logarithmic, a line for each method, and the Pareto front.
 
-use super::{Kind, Line, front, methods_of};
+use super::sweep::colour_of;
+use super::table::{front, methods_of};
+use super::{Kind, Line};
+use plotters::coord::Shift;
+use plotters::coord::combinators::WithKeyPoints;
 use plotters::prelude::*;
 use std::fmt::Display;
+use std::ops::Range;
 
 /// Size of a plot.
 const SIZE: (u32, u32) = (860, 520);
-/// Room for the legend.
+/// Width of the legend.
 const LEGEND: u32 = 220;
 
-/// One axis: what it is called, and where it comes from.
-pub struct Axis {
+/// One axis: its name, and where its values come from.
+pub(super) struct Axis {
     /// With its unit.
-    pub name: &'static str,
+    pub(super) name: &'static str,
     /// A short name for files.
-    pub short: &'static str,
+    pub(super) short: &'static str,
     /// Of a line; lines without it are left out.
-    pub of: fn(&Line) -> Option<f64>,
+    pub(super) of: fn(&Line) -> Option<f64>,
 }
 
 /// Costs that errors are drawn over.
-pub const COSTS: [Axis; 3] = [
+pub(super) const COSTS: [Axis; 3] = [
     Axis { name: "bytes", short: "bytes", of: |l| Some(l.bytes as f64) },
     Axis {
         name: "time of a filtered sample, ns (one core, random; files in batches)",
@@ -35,7 +40,7 @@ pub const COSTS: [Axis; 3] = [
 ];
 
 /// Errors.
-pub const ERRORS: [Axis; 2] = [
+pub(super) const ERRORS: [Axis; 2] = [
     Axis {
         name: "RMS error, linear radiance",
         short: "linear",
@@ -47,22 +52,6 @@ pub const ERRORS: [Axis; 2] = [
         of: |l| Some(l.metrics.log_rms).filter(|e| *e > 0.0),
     },
 ];
-
-/// Colour of a method: files in strong ones, baselines in muted ones, chosen to be told apart by people with
-/// common colour blindness.
-fn colour(method: &str) -> RGBColor {
-    match method {
-        m if m.starts_with("ensemble 2") => RGBColor(0, 60, 130),
-        m if m.starts_with("ensemble 4") => RGBColor(0, 114, 178),
-        m if m.starts_with("ensemble 8") => RGBColor(86, 180, 233),
-        m if m.starts_with("tensor") => RGBColor(213, 94, 0),
-        m if m.starts_with("PCA") => RGBColor(110, 110, 110),
-        m if m.starts_with("local PCA") => RGBColor(150, 140, 90),
-        m if m.starts_with("Tucker") => RGBColor(130, 100, 140),
-        m if m.starts_with("SparseBTF") => RGBColor(0, 158, 115),
-        _ => RGBColor(0, 0, 0),
-    }
-}
 
 /// Whether a method codes linear values: its line is dashed.
 fn is_linear(method: &str) -> bool {
@@ -89,113 +78,185 @@ fn trimmed(v: f64) -> String {
 }
 
 /// One, two and five times the powers of ten of a range.
-fn ticks(range: &std::ops::Range<f64>) -> Vec<f64> {
+fn ticks(range: &Range<f64>) -> Vec<f64> {
     let decades = range.start.log10().floor() as i32..=range.end.log10().ceil() as i32;
     decades.flat_map(|e| [1.0, 2.0, 5.0].map(|m| m * 10f64.powi(e))).filter(|v| range.contains(v)).collect()
 }
 
-/// What draws can go wrong with: memory alone, so it is told as text.
-fn told(error: impl Display) -> String {
+/// Drawing into a text can fail in plotters' own types alone, which become text.
+fn text_of(error: impl Display) -> String {
     error.to_string()
 }
 
-/// Draws the lines of one dataset, or says why not.
+/// Style of labels, titles and the legend.
+const FONT: &str = "sans-serif";
+/// Colour and width of the Pareto front.
+const FRONT: (RGBColor, u32) = (RGBColor(250, 214, 120), 9);
+/// Height of a row of the legend, and of the first one.
+const ROW: i32 = 22;
+const FIRST_ROW: i32 = 24;
+
+/// One axis of a chart.
+type Logarithmic = WithKeyPoints<LogCoord<f64>>;
+type Chart<'a, 's> = ChartContext<'a, SVGBackend<'s>, Cartesian2d<Logarithmic, Logarithmic>>;
+type Area<'s> = DrawingArea<SVGBackend<'s>, Shift>;
+
+/// A line and where it is drawn: its cost and its error.
+#[derive(Clone, Copy)]
+struct Placed<'l> {
+    line: &'l Line,
+    at: (f64, f64),
+}
+
+impl<'l> Placed<'l> {
+    /// `None` for a line that has no finite place on both axes.
+    fn new(line: &'l Line, cost: &Axis, error: &Axis) -> Option<Placed<'l>> {
+        let at = ((cost.of)(line)?, (error.of)(line)?);
+        (at.0.is_finite() && at.1.is_finite() && at.0 > 0.0).then_some(Placed { line, at })
+    }
+}
+
+/// A range with a margin around what is drawn along one axis.
+fn range(placed: &[Placed<'_>], of: fn(&Placed<'_>) -> f64) -> Range<f64> {
+    let (least, most) = placed.iter().fold((f64::MAX, f64::MIN), |(a, b), p| (a.min(of(p)), b.max(of(p))));
+    least / 1.25..most * 1.25
+}
+
+/// An empty chart with axes.
+fn chart<'a, 's>(
+    area: &'a Area<'s>,
+    [x, y]: [Range<f64>; 2],
+    names: [&str; 2],
+) -> Result<Chart<'a, 's>, String> {
+    let mut chart = ChartBuilder::on(area)
+        .margin(12)
+        .x_label_area_size(46)
+        .y_label_area_size(64)
+        .build_cartesian_2d(
+            x.clone().log_scale().with_key_points(ticks(&x)),
+            y.clone().log_scale().with_key_points(ticks(&y)),
+        )
+        .map_err(text_of)?;
+    chart
+        .configure_mesh()
+        .x_desc(names[0])
+        .y_desc(names[1])
+        .max_light_lines(0)
+        .x_label_formatter(&|v| short(*v))
+        .y_label_formatter(&|v| short(*v))
+        .light_line_style(RGBColor(242, 242, 242))
+        .bold_line_style(RGBColor(222, 222, 222))
+        .label_style((FONT, 13))
+        .axis_desc_style((FONT, 14))
+        .draw()
+        .map_err(text_of)?;
+    Ok(chart)
+}
+
+/// A method's points and how they are drawn.
+struct Curve<'l> {
+    method: &'l str,
+    /// By cost, and by falling error where costs are equal.
+    points: Vec<Placed<'l>>,
+    colour: RGBColor,
+    /// Files are drawn stronger than baselines.
+    is_file: bool,
+}
+
+impl<'l> Curve<'l> {
+    fn new(method: &'l str, placed: &[Placed<'l>]) -> Curve<'l> {
+        let mut points: Vec<Placed<'l>> =
+            placed.iter().copied().filter(|p| p.line.method == method).collect();
+        points.sort_by(|a, b| a.at.0.total_cmp(&b.at.0).then(b.at.1.total_cmp(&a.at.1)));
+        let is_file = points.first().is_some_and(|p| p.line.kind == Kind::File);
+        let [red, green, blue] = colour_of(method);
+        Curve { method, points, colour: RGBColor(red, green, blue), is_file }
+    }
+
+    fn style(&self) -> ShapeStyle {
+        self.colour.stroke_width(if self.is_file { 2 } else { 1 })
+    }
+
+    fn radius(&self) -> i32 {
+        if self.is_file { 4 } else { 3 }
+    }
+
+    /// Draws the curve and its points, those of the front filled.
+    fn draw(&self, chart: &mut Chart<'_, '_>, front: &[&Line]) -> Result<(), String> {
+        // In the order of budgets, so that a line does not fold where a cost hardly changes.
+        let mut by_bytes = self.points.clone();
+        by_bytes.sort_by_key(|p| p.line.bytes);
+        let path = by_bytes.iter().map(|p| p.at);
+        if is_linear(self.method) {
+            chart.draw_series(DashedLineSeries::new(path, 6, 4, self.style())).map_err(text_of)?;
+        } else {
+            chart.draw_series(LineSeries::new(path, self.style())).map_err(text_of)?;
+        }
+        for Placed { line, at } in &self.points {
+            let on_front = front.iter().any(|l| l.key == line.key);
+            let style = if on_front { self.colour.filled() } else { WHITE.filled() };
+            chart.draw_series([Circle::new(*at, self.radius(), style)]).map_err(text_of)?;
+            let outline = self.colour.stroke_width(2);
+            chart.draw_series([Circle::new(*at, self.radius(), outline)]).map_err(text_of)?;
+        }
+        Ok(())
+    }
+
+    /// Draws its row of the legend.
+    fn draw_legend(&self, legend: &Area<'_>, row: usize) -> Result<(), String> {
+        let y = FIRST_ROW + ROW * row as i32;
+        let style = self.style();
+        if is_linear(self.method) {
+            for start in [4, 14, 24] {
+                legend.draw(&PathElement::new([(start, y), (start + 6, y)], style)).map_err(text_of)?;
+            }
+        } else {
+            legend.draw(&PathElement::new([(4, y), (34, y)], style)).map_err(text_of)?;
+        }
+        legend.draw(&Circle::new((19, y), self.radius(), self.colour.filled())).map_err(text_of)?;
+        legend.draw(&Text::new(self.method.to_string(), (42, y - 7), (FONT, 13))).map_err(text_of)
+    }
+}
+
+/// The row of the legend for the front, below those of methods.
+fn draw_legend_of_front(legend: &Area<'_>, row: usize) -> Result<(), String> {
+    let y = FIRST_ROW + ROW * row as i32;
+    let style = FRONT.0.stroke_width(FRONT.1);
+    legend.draw(&PathElement::new([(4, y), (34, y)], style)).map_err(text_of)?;
+    legend.draw(&Text::new("Pareto front (filled points)", (42, y - 7), (FONT, 13))).map_err(text_of)
+}
+
+/// Draws the lines of one dataset as SVG.
 ///
 /// # Errors
-/// If there is nothing to draw.
-pub fn draw(lines: &[&Line], cost: &Axis, error: &Axis) -> Result<String, String> {
-    let place = |l: &Line| {
-        Some(((cost.of)(l)?, (error.of)(l)?)).filter(|(a, b)| a.is_finite() && b.is_finite() && *a > 0.0)
-    };
-    let placed: Vec<(&Line, (f64, f64))> = lines.iter().filter_map(|l| Some((*l, place(l)?))).collect();
+/// Why not, in words: if there is nothing to draw.
+pub(super) fn draw(lines: &[&Line], cost: &Axis, error: &Axis) -> Result<String, String> {
+    let placed: Vec<Placed<'_>> = lines.iter().filter_map(|l| Placed::new(l, cost, error)).collect();
     if placed.is_empty() {
         return Err("nothing was measured".into());
     }
-    let range = |of: fn(&(f64, f64)) -> f64| {
-        let (least, most) =
-            placed.iter().fold((f64::MAX, f64::MIN), |(a, b), (_, p)| (a.min(of(p)), b.max(of(p))));
-        least / 1.25..most * 1.25
-    };
-    let (x, y) = (range(|p| p.0), range(|p| p.1));
+    let drawn: Vec<&Line> = placed.iter().map(|p| p.line).collect();
     let mut svg = String::new();
     {
         let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
-        root.fill(&WHITE).map_err(told)?;
+        root.fill(&WHITE).map_err(text_of)?;
         let (area, legend) = root.split_horizontally(SIZE.0 - LEGEND);
-        let mut chart = ChartBuilder::on(&area)
-            .margin(12)
-            .x_label_area_size(46)
-            .y_label_area_size(64)
-            .build_cartesian_2d(
-                x.clone().log_scale().with_key_points(ticks(&x)),
-                y.clone().log_scale().with_key_points(ticks(&y)),
-            )
-            .map_err(told)?;
-        chart
-            .configure_mesh()
-            .x_desc(cost.name)
-            .y_desc(error.name)
-            .max_light_lines(0)
-            .x_label_formatter(&|v| short(*v))
-            .y_label_formatter(&|v| short(*v))
-            .light_line_style(RGBColor(242, 242, 242))
-            .bold_line_style(RGBColor(222, 222, 222))
-            .label_style(("sans-serif", 13))
-            .axis_desc_style(("sans-serif", 14))
-            .draw()
-            .map_err(told)?;
+        let ranges = [range(&placed, |p| p.at.0), range(&placed, |p| p.at.1)];
+        let mut chart = chart(&area, ranges, [cost.name, error.name])?;
         // The front beneath all: what nothing beats in cost and error.
-        let best = front(
-            &placed.iter().map(|p| p.0).collect::<Vec<_>>(),
-            |l| (cost.of)(l).unwrap_or(f64::MAX),
-            |l| (error.of)(l).unwrap_or(f64::MAX),
-        );
-        let path: Vec<(f64, f64)> = best.iter().filter_map(|l| place(l)).collect();
-        chart.draw_series(LineSeries::new(path, RGBColor(250, 214, 120).stroke_width(9))).map_err(told)?;
-        let methods = methods_of(&placed.iter().map(|p| p.0).collect::<Vec<_>>());
+        let best = front(&drawn, |l| (cost.of)(l).unwrap_or(f64::MAX), |l| (error.of)(l).unwrap_or(f64::MAX));
+        let path: Vec<(f64, f64)> =
+            best.iter().filter_map(|l| Placed::new(l, cost, error)).map(|p| p.at).collect();
+        let style = FRONT.0.stroke_width(FRONT.1);
+        chart.draw_series(LineSeries::new(path, style)).map_err(text_of)?;
+        let methods = methods_of(&drawn);
         for (row, method) in methods.iter().enumerate() {
-            let colour = colour(method);
-            let mut points: Vec<(&Line, (f64, f64))> =
-                placed.iter().copied().filter(|(l, _)| l.method == *method).collect();
-            points.sort_by(|a, b| a.1.0.total_cmp(&b.1.0).then(b.1.1.total_cmp(&a.1.1)));
-            // In the order of budgets, so that a line does not fold where a cost hardly changes.
-            let mut by_bytes = points.clone();
-            by_bytes.sort_by_key(|(l, _)| l.bytes);
-            let path = by_bytes.iter().map(|p| p.1);
-            let file = points.first().is_some_and(|(l, _)| l.kind == Kind::File);
-            let style = colour.stroke_width(if file { 2 } else { 1 });
-            if is_linear(method) {
-                chart.draw_series(DashedLineSeries::new(path, 6, 4, style)).map_err(told)?;
-            } else {
-                chart.draw_series(LineSeries::new(path, style)).map_err(told)?;
-            }
-            let radius = if file { 4 } else { 3 };
-            for (line, at) in points {
-                let on_front = best.iter().any(|l| l.key == line.key);
-                let style = if on_front { colour.filled() } else { WHITE.filled() };
-                chart.draw_series([Circle::new(at, radius, style)]).map_err(told)?;
-                chart.draw_series([Circle::new(at, radius, colour.stroke_width(2))]).map_err(told)?;
-            }
-            let y = 24 + 22 * row as i32;
-            let ends = [(4, y), (34, y)];
-            if is_linear(method) {
-                for start in [4, 14, 24] {
-                    legend.draw(&PathElement::new([(start, y), (start + 6, y)], style)).map_err(told)?;
-                }
-            } else {
-                legend.draw(&PathElement::new(ends, style)).map_err(told)?;
-            }
-            legend.draw(&Circle::new((19, y), radius, colour.filled())).map_err(told)?;
-            legend.draw(&Text::new(method.to_string(), (42, y - 7), ("sans-serif", 13))).map_err(told)?;
+            let curve = Curve::new(method, &placed);
+            curve.draw(&mut chart, &best)?;
+            curve.draw_legend(&legend, row)?;
         }
-        let y = 24 + 22 * methods.len() as i32;
-        legend
-            .draw(&PathElement::new([(4, y), (34, y)], RGBColor(250, 214, 120).stroke_width(9)))
-            .map_err(told)?;
-        legend
-            .draw(&Text::new("Pareto front (filled points)", (42, y - 7), ("sans-serif", 13)))
-            .map_err(told)?;
-        root.present().map_err(told)?;
+        draw_legend_of_front(&legend, methods.len())?;
+        root.present().map_err(text_of)?;
     }
     Ok(svg)
 }

@@ -6,6 +6,12 @@ use selvedge::FilteredQuery;
 use selvedge::{Direction, Rgb, Selvedge};
 
 /// A ball of the material under a distant light: orthographic, the texture laid on from the front.
+///
+/// `size` is the picture's side in pixels, `light` a vector towards the light, and `exposure` a factor of
+/// linear radiance.
+///
+/// # Errors
+/// [`ToolError::Mismatch`] if the core refuses the buffers of its own sizes.
 pub fn render_ball(
     material: &Selvedge<'_>,
     size: usize,
@@ -60,7 +66,11 @@ pub fn render_ball(
     Ok(picture)
 }
 
-/// An image of the whole material at one pair of directions.
+/// An image of the whole material at one pair of directions: linear radiance, row by row, of a level of
+/// detail from 0, the finest.
+///
+/// # Errors
+/// [`ToolError::Mismatch`] if the core refuses the buffers of its own sizes.
 pub fn decode_picture(
     material: &Selvedge<'_>,
     level: u32,

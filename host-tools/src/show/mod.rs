@@ -1,5 +1,9 @@
 //! Pictures of balls, and the demo.
 
 pub mod ball;
-pub mod demo;
-pub mod story;
+#[cfg(all(feature = "cli", feature = "import"))]
+pub(crate) mod demo;
+#[cfg(all(feature = "cli", feature = "import"))]
+pub mod excerpt;
+#[cfg(all(feature = "cli", feature = "import"))]
+mod pipeline;

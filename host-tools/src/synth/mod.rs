@@ -5,10 +5,10 @@
 //!
 //! | module | does |
 //! |---|---|
-//! | [`solids`], [`yarns`] | the geometry, from a seed |
-//! | [`mesh`], [`noise`] | height fields and swept tubes; periodic variation |
-//! | [`trace`], [`shadow`], [`radiosity`] | what is seen, lit, and bounced |
-//! | [`shade`], [`preview`](mod@preview) | radiance; pictures for documentation |
+//! | `solids`, `yarns` | the geometry, from a seed |
+//! | `mesh`, `noise` | height fields and swept tubes; periodic variation |
+//! | `trace`, `shadow`, `radiosity` | what is seen, lit, and bounced |
+//! | `shade`, [`preview`](mod@preview) | radiance; pictures for documentation |
 //!
 //! A tile is the unit square and less than 0.09 high. A texel is a square of the plane halfway up; a viewer
 //! sees it where rays through the stratified points of that square meet the surface. Texel rows ascend with y
@@ -18,88 +18,27 @@
 //! What is left out: specular light between surfaces, light through yarns, and hairs. Highlights are those of
 //! the rays of a texel, without a filter over its area; more rays make textures finer than a texel calmer.
 
-pub mod mesh;
-pub mod noise;
+mod mesh;
+mod mesostructure;
+mod noise;
 pub mod preview;
-pub mod radiosity;
-pub mod shade;
-pub mod shadow;
-pub mod solids;
-pub mod trace;
-pub mod yarns;
+mod radiosity;
+mod shade;
+mod shadow;
+mod solids;
+mod trace;
+mod yarns;
 
+pub use mesostructure::Mesostructure;
 pub use preview::preview;
 
 use crate::data::dataset::{Description, Sample, Statistics, Writer};
 use crate::data::directions;
 use crate::error::{Result, ToolError};
-use crate::math::random::Random;
 use glam::{DVec3, Vec3A};
 use rayon::prelude::*;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
-
-/// A kind of modelled surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mesostructure {
-    /// Raised pink glossy cells on a blue plane.
-    Checker,
-    /// Concentric rings of gold on a glossy blue plane.
-    Rings,
-    /// Loosely intertwined round fibres over a dark plane.
-    Tissue,
-    /// A dense twill of two colours.
-    Cloth,
-    /// Stockinette.
-    Knit,
-    /// Beaten copper with sharp highlights.
-    Hammered,
-}
-
-impl Mesostructure {
-    /// All kinds.
-    pub fn all() -> [Mesostructure; 6] {
-        use Mesostructure::{Checker, Cloth, Hammered, Knit, Rings, Tissue};
-        [Checker, Rings, Tissue, Cloth, Knit, Hammered]
-    }
-
-    /// Its name in lower case.
-    pub fn name(self) -> &'static str {
-        match self {
-            Mesostructure::Checker => "checker",
-            Mesostructure::Rings => "rings",
-            Mesostructure::Tissue => "tissue",
-            Mesostructure::Cloth => "cloth",
-            Mesostructure::Knit => "knit",
-            Mesostructure::Hammered => "hammered",
-        }
-    }
-
-    /// One period of its geometry.
-    pub fn mesh(self, seed: u64) -> mesh::Mesh {
-        let random = &mut Random::new(seed);
-        match self {
-            Mesostructure::Checker => solids::checker(random),
-            Mesostructure::Rings => solids::rings(random),
-            Mesostructure::Tissue => yarns::tissue(random),
-            Mesostructure::Cloth => yarns::cloth(random),
-            Mesostructure::Knit => yarns::knit(random),
-            Mesostructure::Hammered => solids::hammered(random),
-        }
-    }
-}
-
-impl std::str::FromStr for Mesostructure {
-    type Err = ToolError;
-
-    fn from_str(name: &str) -> Result<Mesostructure> {
-        let known = || Mesostructure::all().map(Mesostructure::name).join(", ");
-        Mesostructure::all()
-            .into_iter()
-            .find(|kind| kind.name() == name)
-            .ok_or_else(|| ToolError::Usage(format!("{name}: known mesostructures are {}", known())))
-    }
-}
 
 /// What to make.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

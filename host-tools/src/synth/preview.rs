@@ -1,7 +1,7 @@
 //! Pictures of the mesostructures for documentation: two by two tiles, seen obliquely.
 
-use super::Mesostructure;
 use super::mesh::Mesh;
+use super::mesostructure::Mesostructure;
 use super::shade::Scene;
 use crate::data::directions;
 use crate::data::picture::Picture;

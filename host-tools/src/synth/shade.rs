@@ -74,11 +74,6 @@ impl Scene {
         Scene { mesh, tracer, lights, tables, bounced, plane: (low + high) / 2.0 }
     }
 
-    /// Height of the plane that texels lie on: halfway between the lowest and the highest point.
-    pub fn plane(&self) -> f32 {
-        self.plane
-    }
-
     /// How many lights there are.
     pub fn lights(&self) -> usize {
         self.lights.len()

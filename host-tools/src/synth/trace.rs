@@ -16,7 +16,7 @@ use obvhs::triangle::Triangle;
 const MARGIN: f32 = 0.35;
 /// Most pieces of a ray: beyond, a nearly level ray counts as free.
 const PIECES: usize = 32;
-/// How far from its start a ray begins to see, against meeting its own triangle.
+/// Distance from its start at which a ray begins, so that it does not meet its own triangle.
 const START: f32 = 2e-5;
 
 /// A surface to trace rays against.
@@ -68,12 +68,7 @@ impl Tracer {
         Tracer { bvh, triangles, heights: [low - 1e-3, high + 1e-3] }
     }
 
-    /// Slightly below and above all of the surface.
-    pub fn heights(&self) -> [f32; 2] {
-        self.heights
-    }
-
-    /// Follows a ray piece by piece until `visit` says that it ends or it leaves the surface's heights.
+    /// Follows a ray piece by piece until `visit` ends it or it leaves the surface's heights.
     fn pieces(&self, mut origin: Vec3A, direction: Vec3A, mut visit: impl FnMut(Ray) -> bool) {
         // No component may be -0: the tree takes its sign from the comparison with 0 and the sign of its
         // inverse from the bit.
@@ -111,6 +106,7 @@ impl Tracer {
     }
 
     /// Whether a ray meets anything.
+    #[cfg(test)]
     pub fn blocked(&self, origin: Vec3A, direction: Vec3A) -> bool {
         let mut blocked = false;
         self.pieces(origin, direction, |ray| {

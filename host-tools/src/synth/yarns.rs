@@ -68,8 +68,8 @@ fn add_ground(mesh: &mut Mesh, height: f32, steps: usize, look: Look) {
     mesh.add_height_field(steps, |_, _| height, |_, _| look);
 }
 
-/// Height of a yarn on its way over and under others: `over` tells for each crossing, with crossings at half
-/// numbers.
+/// Height of a yarn on its way over and under others: `over` is asked for each crossing, with crossings at
+/// half numbers.
 fn wave(at: f32, over: impl Fn(i32) -> bool) -> f32 {
     let before = (at - 0.5).floor();
     let t = at - 0.5 - before;
@@ -78,16 +78,21 @@ fn wave(at: f32, over: impl Fn(i32) -> bool) -> f32 {
     a + (b - a) * (0.5 - 0.5 * (PI * t).cos())
 }
 
-/// Warp along y and weft along x, `count` of each; `over` tells whether warp `i` lies above weft `j`.
-fn weave(
-    mesh: &mut Mesh,
-    random: &mut Random,
+/// How two sets of yarns cross.
+struct Weave<'a> {
+    /// Yarns of each set.
     count: usize,
-    yarns: [&Yarn; 2],
+    /// Warp, along y, and weft, along x.
+    yarns: [&'a Yarn; 2],
+    /// How far a yarn rises over others and falls below them.
     lift: f32,
+    /// How far it strays to its sides, in spacings.
     wander: f32,
-    over: impl Fn(i32, i32) -> bool,
-) {
+}
+
+/// Adds warp and weft; `over` is whether warp `i` lies above weft `j`.
+fn weave(mesh: &mut Mesh, random: &mut Random, cloth: &Weave<'_>, over: impl Fn(i32, i32) -> bool) {
+    let &Weave { count, yarns, lift, wander } = cloth;
     let spacing = 1.0 / count as f32;
     for (kind, yarn) in yarns.into_iter().enumerate() {
         for i in 0..count {
@@ -122,7 +127,8 @@ pub fn tissue(random: &mut Random) -> Mesh {
     let mut mesh = Mesh::default();
     add_ground(&mut mesh, -2.1 * RADIUS, 96, Look::glossy([0.05, 0.03, 0.025], [0.02; 3], 0.5));
     let yarns = [&fibre([0.72, 0.6, 0.38]), &fibre([0.62, 0.5, 0.3])];
-    weave(&mut mesh, random, COUNT, yarns, RADIUS * 0.95, 0.22, |i, j| (i + j).rem_euclid(2) == 0);
+    let crossing = Weave { count: COUNT, yarns, lift: RADIUS * 0.95, wander: 0.22 };
+    weave(&mut mesh, random, &crossing, |i, j| (i + j).rem_euclid(2) == 0);
     mesh
 }
 
@@ -142,7 +148,8 @@ pub fn cloth(random: &mut Random) -> Mesh {
     let mut mesh = Mesh::default();
     add_ground(&mut mesh, -2.1 * HALF[1], 48, Look::glossy([0.03; 3], [0.0; 3], 0.5));
     let yarns = [&yarn([0.42, 0.06, 0.05], 6.0), &yarn([0.66, 0.52, 0.3], 5.0)];
-    weave(&mut mesh, random, COUNT, yarns, HALF[1], 0.06, |i, j| (i - j).rem_euclid(4) < 2);
+    let crossing = Weave { count: COUNT, yarns, lift: HALF[1], wander: 0.06 };
+    weave(&mut mesh, random, &crossing, |i, j| (i - j).rem_euclid(4) < 2);
     mesh
 }
 
@@ -164,7 +171,7 @@ pub fn knit(random: &mut Random) -> Mesh {
     add_ground(&mut mesh, -0.31 * width, 64, Look::glossy([0.05, 0.06, 0.07], [0.0; 3], 0.5));
     for row in 0..ROWS {
         let (sway, rise) = (Noise::new(random, WALES, 1), Noise::new(random, WALES * 2, 1));
-        // Head and feet lie behind, the legs in front.
+        // Top and bottom of a loop lie behind, the legs in front.
         let centre = |u: f32| {
             let t = TAU * WALES as f32 * u;
             let x = width / TAU * (t + 1.4 * (2.0 * t).sin());

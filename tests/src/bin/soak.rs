@@ -2,10 +2,10 @@
 //! count of executions.
 //!
 //! `soak EXECUTIONS [TARGET...]`; what fails is written beside as `soak-TARGET.bytes` before the panic is
-//! told. It has no feedback from coverage, so it finds less than libFuzzer in the same number of executions;
+//! reported. It has no feedback from coverage, so it finds less than libFuzzer in the same number of executions;
 //! it needs nothing but a stable compiler.
 //!
-//! The heap is watched: reading the files of others may take twice what is given and a constant
+//! The heap is watched: reading third-party files may take twice what is given and a constant
 //! (`Target::memory` of the targets).
 
 use peak_alloc::PeakAlloc;

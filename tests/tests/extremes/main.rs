@@ -1,11 +1,11 @@
 //! The coverage lists of the generators of legal but extreme files: the smallest and the largest of every
 //! field, and every branch of the reconstruction, are reached by some seed or by a file that is made for it.
 //!
-//! One list is shared; each method has its own in a module of its name, and one line in [`OWN`].
+//! One list is shared; each method has its own in a file of `methods`.
 
 mod shared;
-mod sparse_ensemble;
-mod sparse_tensor;
+// A module for each file of `methods`, and `OWN`, their lists.
+include!(concat!(env!("OUT_DIR"), "/extremes.rs"));
 
 use selvedge::kernel::direction::ONE_Q18;
 use selvedge::{Direction, Limits, Selvedge};
@@ -17,36 +17,18 @@ use selvedge_tools::methods::{METHODS, Method};
 use std::collections::BTreeSet;
 
 /// What a method must reach, beside what is shared.
-struct Own {
+pub struct Own {
     /// Name of the method.
-    name: &'static str,
+    pub name: &'static str,
     /// Seeds of its generator.
-    seeds: u64,
-    /// Its list.
-    list: &'static [&'static str],
+    pub seeds: u64,
+    /// Its list. Words behind a colon are values.
+    pub list: &'static [&'static str],
     /// Notes what a model of it reaches.
-    reached: fn(&MaterialModel, &Selvedge<'_>, &mut Seen),
+    pub reached: fn(&MaterialModel, &Selvedge<'_>, &mut Seen),
     /// Files that no random number would make.
-    made: fn() -> Vec<MaterialModel>,
+    pub made: fn() -> Vec<MaterialModel>,
 }
-
-/// The methods' own lists.
-const OWN: &[Own] = &[
-    Own {
-        name: "sparse-ensemble",
-        seeds: 400,
-        list: sparse_ensemble::LIST,
-        reached: sparse_ensemble::reached,
-        made: sparse_ensemble::made,
-    },
-    Own {
-        name: "sparse-tensor",
-        seeds: 150,
-        list: sparse_tensor::LIST,
-        reached: sparse_tensor::reached,
-        made: sparse_tensor::made,
-    },
-];
 
 /// What was reached.
 #[derive(Default)]

@@ -6,12 +6,12 @@ use crate::container::header::Header;
 use crate::error::Rule;
 use crate::kernel::material::{Material, level_size};
 use crate::kernel::words::{Words, word};
+use crate::method::rule::{Call, Method, Per, SectionRule, Source, layer_instance};
 use crate::method::sparse_ensemble::cost::record_operations;
 use crate::method::sparse_ensemble::{
     ANGULAR_PART, ATOMS_PART, COEFFICIENTS_PART, LOW_BITS_BITS, METHOD_SPARSE_ENSEMBLE, SHIFT_BITS,
     SPATIAL_PART, atom_light, atom_shift, atom_view, atom_x, atom_y,
 };
-use crate::method::{Call, Method, Per, SectionRule, Source, layer_instance};
 use crate::walk::check::{Check, Section};
 use crate::walk::stream::{Ones, window};
 

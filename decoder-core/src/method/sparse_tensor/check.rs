@@ -6,12 +6,12 @@ use crate::container::header::Header;
 use crate::error::Rule;
 use crate::kernel::material::{Material, level_size};
 use crate::kernel::words::{low_part, word};
+use crate::method::rule::{Call, Method, Per, SectionRule, Source, layer_instance};
 use crate::method::sparse_tensor::cost::layer_operations;
 use crate::method::sparse_tensor::{
     FIBRES_PART, GROUP_TEXELS, LIGHT_ATOMS_PART, LISTS_PART, METHOD_SPARSE_TENSOR, bit_length, gain_shift,
     list_bits, list_coefficient, list_low_bits,
 };
-use crate::method::{Call, Method, Per, SectionRule, Source, layer_instance};
 use crate::walk::check::{Check, Section};
 use crate::walk::stream::{Ones, window};
 

@@ -10,7 +10,6 @@ use super::{
     angular_shift, blend_light, corner_weight, gain_shift, light_entry, list_bits, list_coefficient,
     list_low_bits, lists_start,
 };
-use crate::batch::FilteredQuery;
 use crate::fast::finish::finish;
 use crate::fast::located::ReadySets;
 use crate::fast::table::bytes_from;
@@ -22,6 +21,7 @@ use crate::kernel::interpolation::place_at_position;
 use crate::kernel::material::part;
 use crate::kernel::position::{Axis, Place};
 use crate::kernel::words::{low_part, word};
+use crate::query::FilteredQuery;
 use crate::selvedge::Selvedge;
 use crate::walk::stream::{Ones, window};
 

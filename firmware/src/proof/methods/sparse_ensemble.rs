@@ -2,8 +2,8 @@
 
 use crate::{any, i, n};
 use core::hint::black_box;
-use selvedge::method::sparse_ensemble::{self, cost};
 use selvedge::kernel::{material, position, words};
+use selvedge::method::sparse_ensemble::{self, cost};
 use selvedge::{Located, Taps};
 
 /// For numbers that no file may hold.

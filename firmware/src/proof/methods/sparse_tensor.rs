@@ -2,8 +2,8 @@
 
 use crate::{any, i, n};
 use core::hint::black_box;
-use selvedge::method::sparse_tensor::{self, cost};
 use selvedge::kernel::{material, position, words};
+use selvedge::method::sparse_tensor::{self, cost};
 use selvedge::{Located, Taps, Values};
 
 /// For numbers that no file may hold.

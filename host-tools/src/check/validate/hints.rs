@@ -3,7 +3,7 @@
 use crate::methods::METHODS;
 use selvedge::Rule;
 
-/// A few words for whoever has the file; empty where the rule says it all.
+/// What to do about a finding; empty where the rule itself says it.
 pub fn hint(rule: Rule) -> &'static str {
     let of_methods = METHODS.iter().flat_map(|method| method.hints);
     of_methods.into_iter().find(|(of, _)| *of == rule).map_or_else(|| shared_hint(rule), |(_, hint)| hint)

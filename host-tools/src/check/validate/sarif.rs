@@ -1,6 +1,8 @@
 //! Findings as SARIF 2.1.0, the form in which code hosts and editors show what checkers found.
 
-use super::{ADVICE, FileReport, Severity, hint};
+use super::advice::ADVICE;
+use super::hints::hint;
+use super::report::{FileReport, Severity};
 use selvedge::Rule;
 use serde_json::{Value, json};
 
@@ -9,15 +11,15 @@ pub fn sarif(files: &[FileReport]) -> Value {
     let of_rule = |rule: &Rule| {
         let help = hint(*rule);
         let help = if help.is_empty() { rule.title() } else { help };
-        json!({ "id": rule.id(), "name": rule.name(), "shortDescription": { "text": rule.title() }, "help": { "text": help } })
+        described(rule.id(), rule.name(), rule.title(), help)
     };
-    let of_advice = ADVICE.iter().map(|a| json!({ "id": a.id, "name": a.name, "shortDescription": { "text": a.expected }, "help": { "text": a.hint } }));
+    let of_advice = ADVICE.iter().map(|a| described(a.id, a.name, a.expected, a.hint));
     let rules: Vec<Value> = Rule::ALL.iter().map(of_rule).chain(of_advice).collect();
     let index_of = |id: &str| rules.iter().position(|rule| rule["id"] == id).unwrap_or(0);
     let mut results = Vec::new();
     let mut troubles = Vec::new();
     for file in files {
-        let artifact = json!({ "uri": uri(&file.file) });
+        let artifact = json!({ "artifactLocation": { "uri": uri(&file.file) } });
         results.extend(file.findings.iter().map(|f| {
             let level = match f.severity {
                 Severity::Error => "error",
@@ -25,27 +27,50 @@ pub fn sarif(files: &[FileReport]) -> Value {
                 Severity::Note | Severity::Off => "note",
             };
             let part = if f.part == "dictionary" { " of the dictionary" } else { "" };
-            let message = format!("byte {}{part}: {}; found {} ({:#x})", f.offset, f.expected, f.found, f.found);
+            let message =
+                format!("byte {}{part}: {}; found {} ({:#x})", f.offset, f.expected, f.found, f.found);
             json!({
                 "ruleId": f.rule,
                 "ruleIndex": index_of(f.rule),
                 "level": level,
                 "message": { "text": message },
-                "locations": [{ "physicalLocation": { "artifactLocation": artifact, "region": { "byteOffset": f.offset } } }],
+                "locations": [{ "physicalLocation": {
+                    "artifactLocation": artifact["artifactLocation"],
+                    "region": { "byteOffset": f.offset }
+                } }],
             })
         }));
         if let Some(why) = &file.unreadable {
-            troubles.push(json!({ "level": "error", "message": { "text": why }, "locations": [{ "physicalLocation": { "artifactLocation": artifact } }] }));
+            troubles.push(json!({
+                "level": "error",
+                "message": { "text": why },
+                "locations": [{ "physicalLocation": artifact }],
+            }));
         }
     }
     json!({
         "$schema": "https://json.schemastore.org/sarif-2.1.0.json",
         "version": "2.1.0",
         "runs": [{
-            "tool": { "driver": { "name": "selvedge", "version": env!("CARGO_PKG_VERSION"), "rules": rules } },
-            "invocations": [{ "executionSuccessful": troubles.is_empty(), "toolExecutionNotifications": troubles }],
+            "tool": {
+                "driver": { "name": "selvedge", "version": env!("CARGO_PKG_VERSION"), "rules": rules }
+            },
+            "invocations": [{
+                "executionSuccessful": troubles.is_empty(),
+                "toolExecutionNotifications": troubles,
+            }],
             "results": results,
         }],
+    })
+}
+
+/// A rule or a piece of advice.
+fn described(id: &str, name: &str, short: &str, help: &str) -> Value {
+    json!({
+        "id": id,
+        "name": name,
+        "shortDescription": { "text": short },
+        "help": { "text": help },
     })
 }
 

@@ -1,7 +1,7 @@
 //! The values of a `.btf`: factorisations of the whole, of each view, and the plain store.
 
-use super::Head;
 use super::colour::Model;
+use super::head::{Head, read_rotations};
 use crate::error::Result;
 use crate::foreign::bytes::{Bytes, Cursor, Width};
 use crate::math::linear::product_bt;
@@ -53,16 +53,6 @@ pub(super) struct Store {
     before: Vec<u32>,
     chunks: Vec<u64>,
     chunk_texels: u64,
-}
-
-impl Head {
-    fn pairs(&self) -> usize {
-        self.lights.len() * self.views.len()
-    }
-
-    fn texels(&self) -> usize {
-        self.size[0] * self.size[1]
-    }
 }
 
 fn bits(width: Width) -> &'static str {
@@ -200,7 +190,7 @@ pub(super) fn read_store(cursor: &mut Cursor<'_>, head: &mut Head) -> Result<Bod
     cursor.skip(head.texels() as u64, "mask")?;
     let mut mask = vec![0; head.texels()];
     cursor.bytes.read_at(start, &mut mask)?;
-    super::read_rotations(cursor, head)?;
+    read_rotations(cursor, head)?;
     let is_sparse = compression == 2;
     let mut before = Vec::with_capacity(height);
     let mut stored = 0u32;

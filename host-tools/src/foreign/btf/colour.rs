@@ -42,7 +42,10 @@ fn unlog(v: f32) -> f32 {
 }
 
 impl Model {
-    /// The model of a number, or what the number means if it is not read.
+    /// The model of a number.
+    ///
+    /// # Errors
+    /// What the number means, if such a model is not read.
     pub fn from_number(number: i32, matrix: [f32; 9], mean: [f32; 3]) -> Result<Model, String> {
         Ok(match number {
             0 => Model::Rgb,

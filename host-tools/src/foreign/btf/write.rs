@@ -5,12 +5,13 @@
 //! approximation of that rank but for the first column, which is not orthogonal to the others. No reader
 //! needs it to be.
 
-use super::SIGNATURES;
+use super::head::SIGNATURES;
 use crate::data::dataset::{Dataset, Description};
 use crate::data::directions::to_degrees;
+use crate::data::transfer::Domain;
 use crate::error::{Result, ToolError};
 use crate::files;
-use crate::measure::baseline::pca::{Domain, pca};
+use crate::math::pca::pca;
 use glam::DVec3;
 use std::path::Path;
 

@@ -8,11 +8,13 @@
 //! and everything is counted.
 
 use super::Row;
-use super::decoder::{At, Blend, Decoder, Pairs, add_row};
-use super::pca::{Domain, Pca, decode_and_compare, quantised};
+use super::decoder::{At, Blend, Decoder, Pairs, add_row, inverse_operations};
+use super::pca::{decode_and_compare, quantised};
 use crate::data::dataset::Dataset;
+use crate::data::transfer::Domain;
 use crate::error::Result;
 use crate::math::linear::{eigenbasis, product_bt};
+use crate::math::pca::Pca;
 use crate::math::random::Random;
 use rayon::prelude::*;
 
@@ -307,21 +309,22 @@ impl Decoder for Decoded {
     fn operations(&self, at: &At) -> u64 {
         let (pairs, n, clusters) =
             (at.pairs(self.lights).len() as u64, self.components as u64, self.gathered(at).1 as u64);
-        4 * n + pairs + clusters * (n + 1) * pairs * 4 + self.domain.operations()
+        4 * n + pairs + clusters * (n + 1) * pairs * 4 + inverse_operations(self.domain)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::baseline::pca::{Domain, pca};
+    use crate::data::transfer::Domain;
+    use crate::measure::baseline::pca::components;
     use crate::measure::baseline::tests::small;
 
     #[test]
     fn one_cluster_is_principal_components_and_more_are_better() {
         let folder = tempfile::tempdir().expect("a folder");
         let data = small(folder.path(), [21, 12]);
-        let mut whole = pca(&data, Domain::Linear, 12).expect("made");
+        let mut whole = components(&data, Domain::Linear, 12).expect("made");
         let two = whole.measure(2, 16).expect("measured").linear_rms;
         let one = clusters(&whole, 1, 2).measure(16).expect("measured").linear_rms;
         assert!((one - two).abs() < 0.02 * two, "{one} {two}");

@@ -4,9 +4,10 @@
 //! file. A filtered sample is between four texels, three lights and three views, and each decoder takes it in
 //! the order that costs least for its own layout.
 
-use super::pca::{Domain, Pca};
+use crate::data::transfer::Domain;
+use crate::format::query::vector;
 use crate::math::linear::product_bt;
-use crate::measure::compare::vector;
+use crate::math::pca::Pca;
 use selvedge::kernel::position::axis_at_position;
 use selvedge::{Direction, FilteredQuery, Selvedge, Taps};
 
@@ -197,6 +198,11 @@ pub trait Decoder: Sync + Send {
 /// libraries have, and its scaling.
 pub const EXPONENTIAL: u64 = 7;
 
+/// Multiplications of [`Domain::back`] for three channels.
+pub(crate) fn inverse_operations(domain: Domain) -> u64 {
+    if domain == Domain::Log { 3 * EXPONENTIAL } else { 0 }
+}
+
 /// Multiplications of a sample's position and weights of directions, which files and baselines share; the
 /// rest of finding directions is compared apart.
 pub const POSITION: u64 = 18;
@@ -241,16 +247,9 @@ impl Frame {
 
     /// Images of the mean and of products: `rows` are `[light][colour][column]`, `texels` are
     /// `[texel][column]`.
-    pub fn images(
-        &self,
-        lights: &[Blend],
-        view: Blend,
-        rows: &[f32],
-        texels: &[f32],
-        columns: usize,
-        out: &mut [[f32; 3]],
-    ) {
+    pub fn images(&self, lights: &[Blend], view: Blend, rows: &[f32], texels: &[f32], out: &mut [[f32; 3]]) {
         let count = out.len() / lights.len();
+        let columns = rows.len() / (lights.len() * 3);
         let mut values = vec![0.0f32; lights.len() * 3 * count];
         for (&light, values) in lights.iter().zip(values.chunks_mut(3 * count)) {
             for &(pair, weight) in Pairs::of(light, view, self.lights).iter() {
@@ -288,13 +287,83 @@ pub(crate) fn dot(a: &[f32], b: &[f32]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::data::dataset::Dataset;
     use crate::format::model::TransferModel;
     use crate::math::random::Random;
-    use crate::measure::baseline::pca::{self, Domain};
-    use crate::measure::baseline::{clusters, data, published, tests::small, tucker};
-    use crate::measure::compare::{Source, compare};
+    use crate::measure::baseline::pca::components;
+    use crate::measure::baseline::{Row, clusters, data, published, tests::small, tucker};
+    use crate::measure::compare::compare;
+    use crate::measure::radiance::Baseline;
     use crate::methods::sparse_ensemble::encode::{Criterion, Options, encode, prepare};
     use selvedge::Limits;
+
+    /// Baselines of a small dataset, and what each measured of itself in its own way. The last is the data
+    /// in binary16.
+    fn baselines(dataset: &Dataset, domain: Domain) -> [(Box<dyn Decoder>, Option<Row>); 5] {
+        let mut components = components(dataset, domain, 12).expect("made");
+        let of_three = components.measure(3, 8).expect("measured");
+        let clustered = clusters::clusters(&components, 3, 2);
+        let decomposed = tucker::tucker(&components, 4, 9).expect("made");
+        let layout_of = published::Published::new(dataset).expect("made");
+        let ensembles = layout_of.own_ensembles().expect("made");
+        let mut layout = layout_of.layout(&ensembles, u64::MAX).expect("projected");
+        let of_layout = layout.measure(40).expect("measured");
+        [
+            (Box::new(components.decoder(3, 8)), Some(of_three)),
+            (Box::new(clustered.decoder(8)), Some(clustered.measure(8).expect("measured"))),
+            (Box::new(decomposed.decoder(4, 9, 16)), Some(decomposed.measure(4, 9, 16).expect("measured"))),
+            (Box::new(layout.decoder(40)), Some(of_layout)),
+            (Box::new(data::Uncompressed::new(dataset).expect("read")), None),
+        ]
+    }
+
+    /// A file of the directions of a dataset, whose triangles a locator uses.
+    fn file_of(dataset: &Dataset) -> Vec<u8> {
+        let prepared =
+            prepare(vec![dataset], TransferModel::Log2 { offset: 0.01 }, &|_, _| ()).expect("prepared");
+        let options = Options { criterion: Criterion::Bytes(8000), ..Options::default() };
+        encode(&prepared, &prepared.own_ensembles(4), &options, &|_, _| ()).expect("encoded").bytes
+    }
+
+    /// Compares a filtered sample between two lights, two views and four texels with a blend of images.
+    /// `exact`: values are not bent between texels, so that the sample may be between them too. Gives the
+    /// number of colours that were compared.
+    fn check_sample(
+        decoder: &dyn Decoder,
+        random: &mut Random,
+        [width, height]: [usize; 2],
+        exact: bool,
+    ) -> usize {
+        let (light, view) = (random.range(0, 7) as usize, random.range(0, 4) as usize);
+        let weight = [0.5, 0.25, 0.25];
+        let (light, view) = (
+            Blend { index: [light, light + 1, light], weight },
+            Blend { index: [view, view + 1, view], weight },
+        );
+        let mut image = vec![[0.0; 3]; width * height];
+        decoder.images(&[light], view, &mut image);
+        let (x, y) = (random.range(0, 19) as usize, random.range(0, 10) as usize);
+        let weights = if exact { [0.25, 0.75] } else { [1.0, 0.0] };
+        let at = At {
+            x: [(x, weights[0]), (x + 1, weights[1])],
+            y: [(y, weights[0]), (y + 1, weights[1])],
+            light,
+            view,
+        };
+        let (found, mut wanted) = (decoder.filtered(&at), [0.0f32; 3]);
+        let texels = at.texels(width);
+        texels.iter().for_each(|&(texel, weight)| add_row(&mut wanted, weight, &image[texel]));
+        assert!(decoder.operations(&at) > 0);
+        // Values below zero are cut at each texel of an image, and once of a sample: colours with such a
+        // texel say nothing.
+        let comparable = (0..3).filter(|&c| texels.iter().all(|&(texel, _)| image[texel][c] > 0.0));
+        comparable
+            .inspect(|&c| {
+                let difference = (found[c] - wanted[c]).abs();
+                assert!(difference < 1e-4 * (1.0 + wanted[c].abs()), "{found:?} {wanted:?}");
+            })
+            .count()
+    }
 
     /// Every decoder gives the errors that its baseline measures in its own way, and a filtered sample is the
     /// blend of what the images have.
@@ -303,103 +372,30 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let dataset = small(folder.path(), [21, 12]);
         let description = dataset.description();
-        let prepared =
-            prepare(vec![&dataset], TransferModel::Log2 { offset: 0.01 }, &|_, _| ()).expect("prepared");
-        let options = Options { criterion: Criterion::Bytes(8000), ..Options::default() };
-        let bytes =
-            encode(&prepared, &prepared.own_ensembles(4), &options, &|_, _| ()).expect("encoded").bytes;
+        let bytes = file_of(&dataset);
         let file = selvedge::open(&bytes, &Limits::NONE).unwrap_or_else(|finding| panic!("{finding}"));
-        let locator = Locator {
-            file: &file,
-            size: description.size,
-            lights: description.lights.clone(),
-            views: description.views.clone(),
-        };
-
+        let (lights, views) = (description.lights.clone(), description.views.clone());
+        let locator = Locator { file: &file, size: description.size, lights, views };
+        let offset = dataset.statistics().log_offset();
         for domain in [Domain::Linear, Domain::Log] {
-            let mut components = pca::pca(&dataset, domain, 12).expect("made");
-            let of_three = components.measure(3, 8).expect("measured");
-            let clustered = clusters::clusters(&components, 3, 2);
-            let decomposed = tucker::tucker(&components, 4, 9).expect("made");
-            let layout_of = published::Published::new(&dataset).expect("made");
-            let ensembles = layout_of.own_ensembles().expect("made");
-            let mut layout = layout_of.layout(&ensembles, u64::MAX).expect("projected");
-            let of_layout = layout.measure(40).expect("measured");
-            let all: [(Box<dyn Decoder>, Option<crate::measure::baseline::Row>); 5] = [
-                (Box::new(components.decoder(3, 8)), Some(of_three)),
-                (Box::new(clustered.decoder(8)), Some(clustered.measure(8).expect("measured"))),
-                (
-                    Box::new(decomposed.decoder(4, 9, 16)),
-                    Some(decomposed.measure(4, 9, 16).expect("measured")),
-                ),
-                (Box::new(layout.decoder(40)), Some(of_layout)),
-                (Box::new(data::Uncompressed::new(&dataset).expect("read")), None),
-            ];
             let mut random = Random::new(3);
-            for (number, (decoder, row)) in all.iter().enumerate() {
-                let source = Source::Baseline(decoder.as_ref(), &locator);
-                let metrics = compare(
-                    Source::Data(&dataset),
-                    source,
-                    description,
-                    dataset.statistics().log_offset(),
-                    None,
-                    &|_, _| (),
-                )
-                .expect("compared");
-                match row {
-                    Some(row) => {
-                        assert_eq!(row.bytes, decoder.bytes());
-                        assert!(
-                            (row.linear_rms / metrics.linear_rms - 1.0).abs() < 1e-3,
-                            "{number}: {row:?} {metrics:?}"
-                        );
-                        assert!(
-                            (row.log_rms / metrics.log_rms - 1.0).abs() < 1e-3,
-                            "{number}: {row:?} {metrics:?}"
-                        );
-                    }
+            for (number, (decoder, row)) in baselines(&dataset, domain).iter().enumerate() {
+                let source = Baseline { decoder: decoder.as_ref(), locator: &locator };
+                let metrics =
+                    compare(&dataset, &source, description, offset, None, &|_, _| ()).expect("compared");
+                if let Some(row) = row {
+                    assert_eq!(row.bytes, decoder.bytes());
+                    let near = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-3;
+                    assert!(near(row.linear_rms, metrics.linear_rms), "{number}: {row:?} {metrics:?}");
+                    assert!(near(row.log_rms, metrics.log_rms), "{number}: {row:?} {metrics:?}");
+                } else {
                     // What binary16 rounds.
-                    None => assert!(metrics.log_rms < 1e-3, "{metrics:?}"),
+                    assert!(metrics.log_rms < 1e-3, "{metrics:?}");
                 }
-                // Between lights and views, at a texel: an image; between texels too: four of them, where
-                // values are not bent by a logarithm.
-                let mut images = vec![[0.0; 3]; description.texels()];
-                let mut compared = 0;
-                for _ in 0..20 {
-                    let (light, view) = (random.range(0, 7) as usize, random.range(0, 4) as usize);
-                    let weight = [0.5, 0.25, 0.25];
-                    let (light, view) = (
-                        Blend { index: [light, light + 1, light], weight },
-                        Blend { index: [view, view + 1, view], weight },
-                    );
-                    decoder.images(&[light], view, &mut images);
-                    let (x, y) = (random.range(0, 19) as usize, random.range(0, 10) as usize);
-                    let bent = domain == Domain::Log || number == 3;
-                    let weights = if bent && number != 4 { [1.0, 0.0] } else { [0.25, 0.75] };
-                    let at = At {
-                        x: [(x, weights[0]), (x + 1, weights[1])],
-                        y: [(y, weights[0]), (y + 1, weights[1])],
-                        light,
-                        view,
-                    };
-                    let (found, mut wanted) = (decoder.filtered(&at), [0.0f32; 3]);
-                    at.texels(21)
-                        .iter()
-                        .for_each(|&(texel, weight)| add_row(&mut wanted, weight, &images[texel]));
-                    // Values below zero are cut at each texel of an image, and once of a sample: colours with
-                    // such a texel say nothing.
-                    for c in
-                        (0..3).filter(|&c| at.texels(21).iter().all(|&(texel, _)| images[texel][c] > 0.0))
-                    {
-                        compared += 1;
-                        assert!(
-                            (found[c] - wanted[c]).abs() < 1e-4 * (1.0 + wanted[c].abs()),
-                            "{number} {domain:?}: {found:?} {wanted:?}"
-                        );
-                    }
-                    assert!(decoder.operations(&at) > 0);
-                }
+                let bent = domain == Domain::Log || number == 3;
+                let mut check =
+                    || check_sample(decoder.as_ref(), &mut random, description.size, !bent || number == 4);
+                let compared: usize = (0..20).map(|_| check()).sum();
                 assert!(compared > 30, "{number}: {compared}");
             }
         }

@@ -7,10 +7,12 @@
 //! four times the memory and is what [`Decoded`] does.
 
 use super::Row;
-use super::decoder::{At, Blend, Decoder, Frame, add_row, dot};
-use super::pca::{Pca, decode_and_compare, pass, quantised};
+use super::decoder::{At, Blend, Decoder, Frame, add_row, dot, inverse_operations};
+use super::pca::{decode_and_compare, quantised};
+use crate::data::pass::pass;
 use crate::error::Result;
 use crate::math::linear::{Basis, eigenbasis, product, product_at, product_bt};
+use crate::math::pca::Pca;
 
 /// Most columns of view, and of light, that a decoder works with.
 pub const MOST_COLUMNS: usize = 512;
@@ -237,7 +239,7 @@ impl Decoder for Decoded {
             .iter()
             .zip(rows.chunks_mut(3 * l))
             .for_each(|(&light, rows)| Decoded::blended(&self.light, 3 * l, light, rows));
-        self.frame.images(lights, view, &rows, &by_view, l, out);
+        self.frame.images(lights, view, &rows, &by_view, out);
     }
 
     fn filtered(&self, at: &At) -> [f32; 3] {
@@ -264,21 +266,22 @@ impl Decoder for Decoded {
             + of_lights * 3 * l
             + 3 * l
             + of_views * of_lights * 4
-            + self.frame.domain.operations()
+            + inverse_operations(self.frame.domain)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::baseline::pca::{Domain, pca};
+    use crate::data::transfer::Domain;
+    use crate::measure::baseline::pca::components;
     use crate::measure::baseline::tests::small;
 
     #[test]
     fn more_columns_are_better_until_only_the_spatial_modes_lose() {
         let folder = tempfile::tempdir().expect("a folder");
         let data = small(folder.path(), [20, 12]);
-        let whole = pca(&data, Domain::Linear, 40).expect("made");
+        let whole = components(&data, Domain::Linear, 40).expect("made");
         let tucker = tucker(&whole, 6, 27).expect("made");
         let errors: Vec<f64> = [(1, 2), (2, 4), (4, 8), (6, 27)]
             .map(|(v, l)| tucker.measure(v, l, 16).expect("measured").linear_rms)

@@ -7,7 +7,8 @@
 use crate::data::dataset::Dataset;
 use crate::data::transfer::Forward;
 use crate::error::Result;
-use crate::math::linear::{ordered, product_at};
+use crate::math::linear::product_at;
+use crate::work::ordered;
 
 /// A grid of blocks over a dataset, read through a transfer.
 pub struct Blocks<'a> {

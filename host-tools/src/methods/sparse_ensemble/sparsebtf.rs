@@ -20,6 +20,8 @@ use std::path::{Path, PathBuf};
 
 /// Texels along the side of the authors' blocks.
 const EDGE: usize = 10;
+/// Bits of a quantised coefficient, where none are asked for.
+pub const VALUE_BITS: u32 = 10;
 /// What the authors add before the logarithm.
 pub const LOG_OFFSET: f32 = 1e-5;
 /// Red, green and blue from the authors' Y, U, V.

@@ -15,12 +15,13 @@
 use crate::data::dataset::Dataset;
 use crate::error::{Result, ToolError};
 use crate::format::model::TransferModel;
-use crate::math::linear::{Basis, eigenbasis, nearest_orthogonal, ordered};
+use crate::math::linear::{Basis, eigenbasis, nearest_orthogonal};
 use crate::math::random::Random;
 use crate::methods::sparse_ensemble::blocks::{self, Blocks, Moments};
 use crate::methods::sparse_ensemble::dictionary::{Ensemble, Scratch, Turn};
 use crate::methods::sparse_ensemble::encode::candidates::magnitude_of_rank;
 use crate::methods::sparse_ensemble::encode::{Prepared, prepare};
+use crate::work::ordered;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

@@ -7,7 +7,6 @@
 //! for speed and for a second reading, held equal by tests.
 
 use super::records::{Blend, Coefficient, factor, for_each_coefficient, record_of};
-use crate::batch::FilteredQuery;
 use crate::fast::finish::finish;
 use crate::fast::located::ReadySets;
 use crate::fast::table::{Table, entry};
@@ -21,6 +20,7 @@ use crate::kernel::words::word;
 use crate::method::sparse_ensemble::{
     RECORD_BOUND, Record, Tables, atom_light, atom_shift, atom_view, coefficients_start, tables_of,
 };
+use crate::query::FilteredQuery;
 use crate::selvedge::Selvedge;
 
 /// Queries side by side.

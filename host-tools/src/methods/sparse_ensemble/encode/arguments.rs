@@ -1,6 +1,6 @@
 //! Options of the sparse ensemble on the command line.
 
-use super::encoder::SparseEnsemble;
+use super::settings::SparseEnsemble;
 use crate::encode::parse::counts;
 use crate::error::Result;
 use crate::files;

@@ -5,9 +5,9 @@
 //! data.
 
 use crate::error::Result;
-use crate::math::linear::ordered;
 use crate::methods::sparse_ensemble::blocks::{self, Blocks};
 use crate::methods::sparse_ensemble::dictionary::{self, Ensemble};
+use crate::work::ordered;
 
 /// How many coefficients to keep of a block.
 #[derive(Clone, Copy, Debug, PartialEq)]

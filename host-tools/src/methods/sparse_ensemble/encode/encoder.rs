@@ -1,40 +1,26 @@
 //! The encoder of the sparse ensemble behind the trait of encoders.
 
+#[cfg(feature = "cli")]
 use super::arguments::Arguments;
 use super::options::{Criterion, Encoded, Options};
 use super::prepare::prepare;
+use super::settings::SparseEnsemble;
 use super::verified::{self, encode_edge};
 use crate::data::dataset::{Dataset, Description};
+use crate::data::transfer::{Domain, transfer_of};
 use crate::encode::encoder::{self, Attempts, Common, Encoder, Levels, Settings};
 use crate::encode::goal::{Goal, Verified};
 use crate::error::{Result, ToolError};
 use crate::format::model::TransferModel;
-use crate::measure::baseline::pca::Domain;
 use crate::methods::sparse_ensemble::dictionary::Ensemble;
 use crate::methods::sparse_ensemble::dictionary_file::DictionaryFile;
 use crate::methods::sparse_ensemble::train;
-use crate::methods::sparse_tensor::encode::transfer_of;
 use crate::progress::Observer;
+#[cfg(feature = "cli")]
 use clap::{ArgMatches, Args as _, Command, FromArgMatches as _};
-use std::sync::Arc;
 
 /// Name of the method.
 pub const NAME: &str = "sparse-ensemble";
-
-/// The encoder with its own options.
-#[derive(Clone, Debug, Default)]
-pub struct SparseEnsemble {
-    /// Texels along the side of a block, 1 to 16; chosen if `None`.
-    pub edge: Option<usize>,
-    /// Coefficients of a block in each channel: the goal, with [`Goal::AsGiven`].
-    pub coefficients: Option<[usize; 3]>,
-    /// A trained dictionary; the material's own columns if `None`.
-    pub dictionary: Option<Arc<DictionaryFile>>,
-    /// Whether files reference the dictionary instead of embedding its columns.
-    pub external: bool,
-    /// How many dictionaries are trained on the material itself; none if `None`.
-    pub own_dictionaries: Option<usize>,
-}
 
 /// Edge of blocks that dictionaries of a material itself are trained with if none is given.
 const TRAINED_EDGE: usize = 4;
@@ -49,15 +35,6 @@ const SAME_DIRECTION: f64 = 2e-4;
 const OFFSETS: std::ops::RangeInclusive<f64> = 1.2e-38..=1.0;
 
 impl SparseEnsemble {
-    /// The material's own columns and a chosen edge.
-    pub const DEFAULT: SparseEnsemble = SparseEnsemble {
-        edge: None,
-        coefficients: None,
-        dictionary: None,
-        external: false,
-        own_dictionaries: None,
-    };
-
     /// The edge that is encoded with, 0 if it is chosen.
     fn edge(&self) -> usize {
         // The trained spatial bases gain more than another edge.
@@ -164,10 +141,12 @@ impl Encoder for SparseEnsemble {
         verified::choose(goal, reached, |e| (e.metrics.log_rms, e.bytes.len(), e.operations))
     }
 
+    #[cfg(feature = "cli")]
     fn arguments(&self, command: Command) -> Command {
         Arguments::augment_args(command)
     }
 
+    #[cfg(feature = "cli")]
     fn configured(&self, matches: &ArgMatches) -> Result<Box<dyn Encoder>> {
         let arguments =
             Arguments::from_arg_matches(matches).map_err(|error| ToolError::Usage(error.to_string()))?;

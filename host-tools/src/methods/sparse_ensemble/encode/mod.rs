@@ -6,6 +6,7 @@
 //! coefficient is the error of leaving it out. [`verified`] decodes what comes out and encodes again until
 //! the goal holds; [`encoder`] is all of it behind the trait of encoders.
 
+#[cfg(feature = "cli")]
 mod arguments;
 pub mod assemble;
 pub mod candidates;
@@ -16,9 +17,13 @@ pub mod prepare;
 mod records;
 mod search;
 pub mod select;
+pub mod settings;
 pub mod threshold;
 pub mod verified;
 
 pub use options::{Criterion, Encoded, Options};
 pub use prepare::{Prepared, prepare};
 pub use threshold::encode;
+
+/// The encoder with default options.
+pub static ENCODER: settings::SparseEnsemble = settings::SparseEnsemble::DEFAULT;

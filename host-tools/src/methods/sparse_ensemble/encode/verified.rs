@@ -4,10 +4,10 @@
 use super::options::{Criterion, Encoded, Options};
 use super::prepare::Prepared;
 use super::threshold::encode;
+use crate::data::transfer::Domain;
 use crate::encode::goal::{Goal, Steering, Target, Task, Verified, meet};
 use crate::error::{Result, ToolError};
 use crate::format::model::TransferModel;
-use crate::measure::baseline::pca::Domain;
 use crate::methods::sparse_ensemble::dictionary::Ensemble;
 use crate::progress::Observer;
 

@@ -1,7 +1,7 @@
 //! Options of the sparse tensor on the command line.
 
-use super::encoder::{MB, MEMORY, RANK, SparseTensor};
 use super::fit::Shape;
+use super::options::{MB, MEMORY, RANK, SparseTensor};
 use clap::Args;
 
 #[derive(Args)]

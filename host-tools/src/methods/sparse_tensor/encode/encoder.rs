@@ -1,40 +1,23 @@
 //! The encoder of the sparse tensor behind the trait of encoders.
 
+#[cfg(feature = "cli")]
 use super::arguments::Arguments;
 use super::coder::encode_fit;
-use super::fit::{Fit, Shape, Training, fit};
-use super::options::{Encoded, Options};
+use super::fit::{Fit, Shape, fit};
+use super::options::{Encoded, Options, SparseTensor};
 use super::shapes::ShapeSearch;
 use crate::data::dataset::Dataset;
+use crate::data::transfer::Domain;
 use crate::encode::encoder::{self, Attempts, Common, Encoder, Levels, Settings};
 use crate::encode::goal::{Goal, Steering, Task, Verified, domain_name, meet};
 use crate::error::{Result, ToolError};
-use crate::measure::baseline::pca::{Domain, Pca, pca_within};
+use crate::math::pca::{Pca, pca_within};
 use crate::progress::Observer;
+#[cfg(feature = "cli")]
 use clap::{ArgMatches, Args as _, Command, FromArgMatches as _};
 
 /// Name of the method.
 pub const NAME: &str = "sparse-tensor";
-
-/// The encoder with its own options.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SparseTensor {
-    /// Sizes of the dictionaries and lists; chosen if `None`. With [`Goal::AsGiven`] they are the goal.
-    pub shape: Option<Shape>,
-    /// Components that training works in, at most.
-    pub rank: usize,
-    /// Memory budget of their decomposition, bytes.
-    pub memory: usize,
-    /// How long to train.
-    pub training: Training,
-}
-
-/// Components, where none are asked for.
-pub(super) const RANK: u16 = 200;
-/// Memory budget of the decomposition, where none is asked for, MB.
-pub(super) const MEMORY: u32 = 4000;
-/// Bytes of one MB.
-pub(super) const MB: usize = 1_000_000;
 
 /// How targets move towards an error. The prediction is within a few parts in a hundred, and an attempt is
 /// expensive, so the first file that meets the limit is taken.
@@ -48,21 +31,7 @@ const STEERING: Steering = Steering {
     smallest: 0.0,
 };
 
-impl Default for SparseTensor {
-    fn default() -> SparseTensor {
-        SparseTensor::DEFAULT
-    }
-}
-
 impl SparseTensor {
-    /// A chosen shape.
-    pub const DEFAULT: SparseTensor = SparseTensor {
-        shape: None,
-        rank: RANK as usize,
-        memory: MEMORY as usize * MB,
-        training: Training::DEFAULT,
-    };
-
     /// A file that meets the goal, from the components of level 0.
     fn verified(
         &self,
@@ -180,10 +149,12 @@ impl Encoder for SparseTensor {
         reached.into_iter().next()
     }
 
+    #[cfg(feature = "cli")]
     fn arguments(&self, command: Command) -> Command {
         Arguments::augment_args(command)
     }
 
+    #[cfg(feature = "cli")]
     fn configured(&self, matches: &ArgMatches) -> Result<Box<dyn Encoder>> {
         let arguments =
             Arguments::from_arg_matches(matches).map_err(|error| ToolError::Usage(error.to_string()))?;

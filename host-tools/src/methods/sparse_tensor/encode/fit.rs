@@ -9,7 +9,7 @@ use crate::math::ksvd::{
     Code, Found, Pursuit, Rows, code_all, code_with, first_atoms, gram, iterate, normalise,
 };
 use crate::math::linear::{product, product_bt, solve_symmetric};
-use crate::measure::baseline::pca::Pca;
+use crate::math::pca::Pca;
 
 /// How to decompose.
 #[derive(Clone, Copy, Debug, PartialEq)]

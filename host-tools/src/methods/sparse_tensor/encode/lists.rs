@@ -5,7 +5,8 @@ use crate::data::dataset::Dataset;
 use crate::data::transfer::Forward;
 use crate::error::Result;
 use crate::math::ksvd::{Pursuit, Rows, dot, pursue};
-use crate::math::linear::{ordered, product_bt};
+use crate::math::linear::product_bt;
+use crate::work::ordered;
 use rayon::prelude::*;
 
 /// Products of every texel with all atoms, and its energy, both about the mean.

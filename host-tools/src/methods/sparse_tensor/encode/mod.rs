@@ -6,6 +6,7 @@
 //! anything is decoded. [`shapes`] chooses the sizes of dictionaries and lists; [`encoder`] is all of it
 //! behind the trait of encoders.
 
+#[cfg(feature = "cli")]
 mod arguments;
 mod coder;
 pub mod encoder;
@@ -17,18 +18,23 @@ mod ranges;
 pub mod shapes;
 
 pub use coder::{encode, encode_fit};
-pub use options::{Encoded, Options, transfer_of};
+pub use options::{Encoded, Options};
 pub use shapes::ShapeSearch;
+
+/// The encoder with default options.
+pub static ENCODER: options::SparseTensor = options::SparseTensor::DEFAULT;
 
 #[cfg(test)]
 mod tests {
     use super::fit::{Shape, Training};
     use super::{Options, encode};
     use crate::data::dataset::{Dataset, Description, Sample};
+    use crate::data::transfer::Domain;
     use crate::encode::goal::Target;
-    use crate::measure::baseline::pca::{Domain, pca};
+    use crate::math::pca::pca;
     use crate::measure::baseline::tests::small;
-    use crate::measure::compare::{Source, compare};
+    use crate::measure::compare::compare;
+    use crate::measure::radiance::AtLevel;
     use selvedge::Limits;
 
     fn options(target: Target) -> Options {
@@ -40,8 +46,8 @@ mod tests {
     fn decoded(data: &Dataset, bytes: &[u8], domain: Domain) -> f64 {
         let file = selvedge::open(bytes, &Limits::NONE).unwrap_or_else(|finding| panic!("{finding}"));
         let metrics = compare(
-            Source::Data(data),
-            Source::File(&file, 0),
+            data,
+            &AtLevel::finest(&file),
             data.description(),
             data.statistics().log_offset(),
             None,

@@ -1,10 +1,44 @@
 //! How to encode, and what comes out.
 
 use super::fit::{Shape, Trained, Training};
-use crate::data::dataset::Dataset;
 use crate::encode::goal::Target;
-use crate::format::model::{MaterialModel, TransferModel};
-use crate::measure::baseline::pca::Domain;
+use crate::format::model::MaterialModel;
+
+/// The encoder with its own options.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SparseTensor {
+    /// Sizes of the dictionaries and lists; chosen if `None`. With [`Goal::AsGiven`](crate::encode::goal::Goal) they are the goal.
+    pub shape: Option<Shape>,
+    /// Components that training works in, at most.
+    pub rank: usize,
+    /// Memory budget of their decomposition, bytes.
+    pub memory: usize,
+    /// How long to train.
+    pub training: Training,
+}
+
+/// Components, where none are asked for.
+pub(super) const RANK: u16 = 200;
+/// Memory budget of the decomposition, where none is asked for, MB.
+pub(super) const MEMORY: u32 = 4000;
+/// Bytes of one MB.
+pub(super) const MB: usize = 1_000_000;
+
+impl Default for SparseTensor {
+    fn default() -> SparseTensor {
+        SparseTensor::DEFAULT
+    }
+}
+
+impl SparseTensor {
+    /// A chosen shape.
+    pub const DEFAULT: SparseTensor = SparseTensor {
+        shape: None,
+        rank: RANK as usize,
+        memory: MEMORY as usize * MB,
+        training: Training::DEFAULT,
+    };
+}
 
 /// How to encode.
 #[derive(Clone, Copy, Debug)]
@@ -80,17 +114,5 @@ impl Encoded {
             || self.trained.breakdowns > 0
             || self.trained.condition > STIFF
             || is_clipping_frequent(self.clipped, self.coefficients)
-    }
-}
-
-/// The transfer and offset that a domain is coded with.
-pub fn transfer_of(data: &Dataset, domain: Domain) -> TransferModel {
-    let statistics = data.statistics();
-    match domain {
-        Domain::Log => TransferModel::Log2 { offset: statistics.coded_offset() },
-        // Values below 16, so that a texture is far below its bound.
-        Domain::Linear => TransferModel::Linear {
-            exponent: (statistics.largest.max(1e-30).log2().ceil() as i32 - 4).clamp(-60, 60),
-        },
     }
 }

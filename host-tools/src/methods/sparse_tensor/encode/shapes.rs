@@ -6,7 +6,7 @@ use super::options::{Encoded, Options, STIFF, cost};
 use crate::data::dataset::Dataset;
 use crate::encode::goal::Target;
 use crate::error::{Result, ToolError};
-use crate::measure::baseline::pca::Pca;
+use crate::math::pca::Pca;
 
 /// Sizes of dictionaries that are tried: light atoms and ABRDF atoms.
 pub const SIZES: [[usize; 2]; 4] = [[16, 32], [32, 64], [64, 128], [128, 256]];
