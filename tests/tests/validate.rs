@@ -71,7 +71,13 @@ fn all_findings_are_told_and_counted() {
     assert_eq!(counts, [("10.4-9", 1), ("3.1-18", 1), ("8.1-7", 25)]);
     assert_eq!((report.count(), report.findings.len()), (27, 22));
     assert_eq!(report.findings[0].rule, "3.1-18", "in the order of checks");
-    assert!(text(&report).contains("25 findings of 8.1-7 in all"));
+    let text_of_all = text(&report);
+    assert!(text_of_all.contains("25 findings of 8.1-7 in all"));
+    // Its checksums hold, so that it may be of an earlier draft; a damaged file is none.
+    assert!(text_of_all.contains(selvedge_tools::format::draft::FORMAT), "{text_of_all}");
+    file[0x270] ^= 1;
+    let damaged = text(&check(&file));
+    assert!(!damaged.is_empty() && !damaged.contains("draft"), "{damaged}");
 }
 
 fn advised(model: &MaterialModel) -> Vec<&'static str> {

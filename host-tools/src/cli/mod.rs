@@ -37,7 +37,8 @@ use lacking::{bench, report};
 #[cfg(not(feature = "import"))]
 use lacking::{demo, export, import};
 
-use crate::error::Result;
+use crate::error::{Result, ToolError};
+use crate::format::draft;
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 
@@ -156,6 +157,11 @@ pub fn main() -> ExitCode {
                     })
                     .collect();
             eprintln!("selvedge: {words}");
+            if let ToolError::Invalid { finding, .. } = &error
+                && draft::may_be_of_a_draft(finding.rule)
+            {
+                eprintln!("selvedge: {}", draft::note());
+            }
             ExitCode::from(error.exit_code())
         }
     }

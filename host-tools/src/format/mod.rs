@@ -28,6 +28,7 @@
 pub mod bits;
 pub mod blend;
 pub mod container;
+pub mod draft;
 pub mod model;
 pub mod query;
 pub mod renumber;

@@ -17,6 +17,7 @@ pub use sarif::sarif;
 use crate::error::{Result, ToolError, exit_code_of};
 use crate::files;
 use crate::format::container::is_dictionary;
+use crate::format::draft;
 use crate::methods::advice::Advice;
 use rayon::prelude::*;
 use selvedge::{Family, Finding, Limits, Part, Rule};
@@ -206,6 +207,11 @@ pub fn text(report: &FileReport) -> String {
     }
     let cut = report.counts.iter().filter(|(_, count)| **count > KEPT);
     cut.for_each(|(rule, count)| text += &format!("{}: {count} findings of {rule} in all\n", report.file));
+    // Damage explains what follows from it.
+    let mut broken = Rule::ALL.iter().filter(|rule| report.counts.contains_key(rule.id())).peekable();
+    if broken.peek().is_some() && broken.all(|rule| draft::may_be_of_a_draft(*rule)) {
+        text += &format!("{}: note: {}\n", report.file, draft::note());
+    }
     text
 }
 
