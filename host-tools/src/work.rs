@@ -7,6 +7,9 @@ use rayon::prelude::*;
 pub const WAVE: usize = 16;
 
 /// `fold(total, work(i))` for `i` ascending, the work in parallel: the same bits for any number of threads.
+///
+/// # Errors
+/// The first of `work`, by its number within a wave.
 pub fn ordered<T: Send, E: Send, A>(
     count: usize,
     work: impl Fn(usize) -> Result<T, E> + Sync,
@@ -17,6 +20,9 @@ pub fn ordered<T: Send, E: Send, A>(
 }
 
 /// As [`ordered`], with at most `wave` results in memory: the same bits for any number of them.
+///
+/// # Errors
+/// As [`ordered`].
 pub fn ordered_in<T: Send, E: Send, A>(
     wave: usize,
     count: usize,

@@ -95,6 +95,9 @@ fn gain_above(numbers: &[f32], threshold: f32) -> f64 {
 }
 
 /// Projects blocks on the ensembles of the three channels, every `stride`-th of them.
+///
+/// # Errors
+/// If the data cannot be read.
 pub fn collect(
     blocks: &Blocks<'_>,
     ensembles: &[Ensemble; 3],
