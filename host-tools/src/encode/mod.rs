@@ -41,7 +41,7 @@ macro_rules! encoders {
     ($($module:ident)*) => {
         /// The encoders of all methods with their default options, in the order of
         /// [`METHODS`](crate::methods::METHODS).
-        pub static ENCODERS: &[&dyn Encoder] = &[$(&crate::methods::$module::encode::ENCODER),*];
+        pub static ENCODERS: &[&dyn Encoder] = &[$(&crate::methods::$module::encode::encoder::ENCODER),*];
     };
 }
 each_method!(encoders);

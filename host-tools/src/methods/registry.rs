@@ -4,8 +4,8 @@ use crate::error::{Result, ToolError};
 use crate::methods::method::Method;
 use selvedge::{Finding, Part, Rule, Selvedge};
 
-/// Hands a macro the modules of the methods by number, a line each. Each has a `METHOD` and, in `encode`, an
-/// `ENCODER`.
+/// Hands a macro the modules of the methods by number, a line each. Each has a `METHOD` and, in
+/// `encode::encoder`, an `ENCODER`.
 macro_rules! each_method {
     ($then:ident) => {
         $then! {

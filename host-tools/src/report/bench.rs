@@ -1,6 +1,6 @@
 //! What is measured of a file or a baseline, against the data of one dataset.
 
-use super::{COMPARED, Operations};
+use super::line::{COMPARED, Operations};
 use crate::check::count;
 use crate::data::dataset::{Dataset, Description};
 use crate::data::picture::{Picture, log_error};

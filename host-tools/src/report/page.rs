@@ -1,10 +1,10 @@
 //! The page: plots, tables and pictures in one HTML file without scripts, and the same numbers as CSV and
 //! JSON.
 
+use super::line::{HeldOut, Kind, Line, Operations};
 use super::plot::{COSTS, ERRORS, draw};
 use super::sweep::prefix_of;
 use super::table::{methods_of, to_csv};
-use super::{HeldOut, Kind, Line, Operations};
 use crate::error::{Result, ToolError};
 use crate::files;
 use crate::measure::speed::Rate;

@@ -1,8 +1,8 @@
 //! Plots as SVG: an error over a cost, both logarithmic, a line for each method, and the Pareto front.
 
+use super::line::{Kind, Line};
 use super::sweep::colour_of;
 use super::table::{front, methods_of};
-use super::{Kind, Line};
 use plotters::coord::Shift;
 use plotters::coord::combinators::WithKeyPoints;
 use plotters::prelude::*;

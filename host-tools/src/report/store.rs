@@ -1,7 +1,7 @@
 //! The stores of a report: a line of JSON for each measurement, appended when it is complete, so that an
 //! interrupted run is resumed.
 
-use super::{HeldOut, Line};
+use super::line::{HeldOut, Line};
 use crate::error::{Result, ToolError};
 use crate::files;
 use serde::Serialize;
@@ -87,7 +87,7 @@ fn to_json_line<T: Serialize>(line: &T) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::tests::line;
+    use crate::report::line::tests::line;
 
     #[test]
     fn a_store_gives_back_its_lines_and_leaves_out_half_ones() {

@@ -1,6 +1,6 @@
 //! Lines as a table: their methods, their Pareto front, and all of them as CSV.
 
-use super::{Kind, Line};
+use super::line::{Kind, Line};
 
 /// The methods of some lines, in the order in which they came.
 pub(super) fn methods_of<'l>(lines: &[&'l Line]) -> Vec<&'l str> {
@@ -90,7 +90,7 @@ pub(super) fn to_csv(lines: &[Line]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::tests::line;
+    use crate::report::line::tests::line;
 
     #[test]
     fn the_front_has_what_nothing_beats() {

@@ -12,6 +12,9 @@ use syn::{Item, UseTree};
 
 type Name = Vec<String>;
 
+/// A word of a path that a macro fills in.
+const FILLED_IN: &str = "$";
+
 /// The modules of a crate by their paths from its root, each with its code.
 type Modules = BTreeMap<Name, Vec<Item>>;
 
@@ -55,7 +58,7 @@ fn leaves(tree: &UseTree, before: &[String], paths: &mut Vec<Name>) {
     }
 }
 
-/// The words of paths in code: runs of names between double colons. A name that a macro fills in is `$`.
+/// The words of paths in code: runs of names between double colons. A name that a macro fills in is [`FILLED_IN`].
 fn paths_in(tokens: TokenStream, paths: &mut Vec<Name>) {
     let mut run: Name = Vec::new();
     // Colons since the last word of the run.
@@ -81,7 +84,7 @@ fn paths_in(tokens: TokenStream, paths: &mut Vec<Name>) {
                 if colons != 2 {
                     end(&mut run);
                 }
-                run.push(if filled_in { "$".into() } else { word.to_string() });
+                run.push(if filled_in { FILLED_IN.into() } else { word.to_string() });
                 (colons, filled_in) = (0, false);
             }
             other => {
@@ -99,32 +102,34 @@ fn paths_in(tokens: TokenStream, paths: &mut Vec<Name>) {
 
 /// The modules that a path of a module names: none of other crates, several where a macro fills in the name.
 fn resolved(path: &[String], from: &Name, modules: &Modules) -> Vec<Name> {
-    let mut words = path.iter().peekable();
-    let mut base = match words.peek().map(|word| word.as_str()) {
-        Some("crate") => {
-            words.next();
-            Name::new()
+    let with = |base: &Name, word: &str| base.iter().cloned().chain([word.to_owned()]).collect::<Name>();
+    let steps = path.iter().take_while(|word| ["crate", "self", "super"].contains(&word.as_str())).count();
+    let (first, rest) = path.split_at(steps);
+    let mut base = match first.first().map(String::as_str) {
+        Some("crate") => Name::new(),
+        None if rest.first().is_none_or(|word| !modules.contains_key(&with(from, word))) => {
+            return Vec::new();
         }
-        Some("self" | "super") => from.clone(),
-        Some(word)
-            if modules.contains_key(&from.iter().cloned().chain([word.to_owned()]).collect::<Name>()) =>
-        {
-            from.clone()
-        }
-        _ => return Vec::new(),
+        _ => from.clone(),
     };
-    while let Some(word) = words.peek() {
-        match word.as_str() {
-            "self" => {}
-            "super" => drop(base.pop()),
-            _ => break,
-        }
-        words.next();
+    for _ in first.iter().filter(|word| *word == "super") {
+        base.pop();
     }
-    for word in words {
-        if word == "$" {
+    below(base, rest, modules)
+}
+
+/// The modules that the words of a path lead to from a module on.
+fn below(mut base: Name, words: &[String], modules: &Modules) -> Vec<Name> {
+    for (n, word) in words.iter().enumerate() {
+        if word == FILLED_IN {
             let is_child = |name: &&Name| name.len() == base.len() + 1 && name.starts_with(&base);
-            return modules.keys().filter(is_child).cloned().collect();
+            let next = words.get(n + 1).filter(|word| *word != FILLED_IN);
+            let has_next =
+                |name: &&Name| next.is_none_or(|next| modules[*name].iter().any(|item| is_named(item, next)));
+            let children = modules.keys().filter(is_child).filter(has_next);
+            // The last of several is an item of the module.
+            let rest = if words[n + 1..] == [FILLED_IN] { &[] } else { &words[n + 1..] };
+            return children.flat_map(|child| below(child.clone(), rest, modules)).collect();
         }
         base.push(word.clone());
         if !modules.contains_key(&base) {
@@ -133,6 +138,17 @@ fn resolved(path: &[String], from: &Name, modules: &Modules) -> Vec<Name> {
         }
     }
     vec![base]
+}
+
+/// Whether an item declares a name.
+fn is_named(item: &Item, name: &str) -> bool {
+    match item {
+        Item::Mod(item) => item.ident == name,
+        Item::Static(item) => item.ident == name,
+        Item::Const(item) => item.ident == name,
+        Item::Fn(item) => item.sig.ident == name,
+        _ => false,
+    }
 }
 
 /// Which modules each module uses.

@@ -1,7 +1,7 @@
 //! The linear algebra of training: moments, eigenvectors, orthogonal factors, components.
 
+use super::case::{Case, Outcome, case};
 use super::files::dataset;
-use super::{Case, Outcome, case};
 use crate::data::directions;
 use crate::data::transfer::Domain;
 use crate::error::{Result, ToolError};

@@ -1,6 +1,6 @@
 //! The decoder's integer arithmetic against exact arithmetic (chapters 2 and 7).
 
-use super::{Case, Outcome, case};
+use super::case::{Case, Outcome, case};
 use crate::math::random::Random;
 use selvedge::kernel::colour::{transfer_linear, transfer_log2};
 use selvedge::kernel::fixed::{exp2_q31, multiply_q13, multiply_q15, round_shift};

@@ -1,9 +1,9 @@
 //! Directions at their ends: triangulations of hard sets, the horizon, and continuity along the smallest
 //! steps.
 
+use super::case::{Case, Outcome, case};
 use super::files::{direction, opened, small_file, upward, weight_defect};
 use super::weights::hard_sets;
-use super::{Case, Outcome, case};
 use crate::data::directions;
 use crate::error::Result;
 use crate::format::triangulate::{project, triangulate};

@@ -1,7 +1,7 @@
 //! Files at the ends of what is legal: no sum of the decoder overflows, and no colour is not a number.
 
+use super::case::{Case, Outcome, case};
 use super::files::{direction, opened, upward};
-use super::{Case, Outcome, case};
 use crate::check::extreme::extreme;
 use crate::error::Result;
 use crate::format::write::write_material;

@@ -1,7 +1,7 @@
 //! Whole materials, stiff and degenerate, through every encoder and the decoder.
 
+use super::case::{Case, Outcome, case};
 use super::files::{dataset, encoded, opened};
-use super::{Case, Outcome, case};
 use crate::data::directions;
 use crate::data::transfer::Domain;
 use crate::encode::goal::{domain_name, rms_of};

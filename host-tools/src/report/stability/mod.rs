@@ -7,6 +7,7 @@
 
 mod algebra;
 mod arithmetic;
+mod case;
 mod ends;
 mod files;
 mod legal;
@@ -14,70 +15,10 @@ mod materials;
 mod pursuit;
 mod weights;
 
-use crate::error::Result;
-use serde::Serialize;
+pub use case::{Outcome, Verdict};
+
+use case::Case;
 use std::path::Path;
-
-/// What a case measured.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Outcome {
-    /// Condition number, dynamic range, or how extreme the case is.
-    pub condition: f64,
-    /// Largest error that is allowed.
-    pub bound: f64,
-    /// Error that was measured.
-    pub measured: f64,
-}
-
-impl Outcome {
-    /// Whether the bound holds; a NaN does not.
-    pub fn holds(&self) -> bool {
-        self.measured <= self.bound
-    }
-}
-
-/// A case and its outcome.
-#[derive(Clone, Debug, Serialize)]
-pub struct Verdict {
-    /// Group of cases.
-    pub group: &'static str,
-    /// The case.
-    pub name: String,
-    /// What its condition is.
-    pub condition_is: &'static str,
-    /// Where the bound comes from, and its unit.
-    pub source: &'static str,
-    /// What was measured, or why nothing could be.
-    pub outcome: std::result::Result<Outcome, String>,
-}
-
-impl Verdict {
-    /// Whether the case was measured and keeps its bound.
-    pub fn holds(&self) -> bool {
-        self.outcome.as_ref().is_ok_and(Outcome::holds)
-    }
-}
-
-/// Measures a case; the folder holds its data.
-type Run = Box<dyn Fn(&Path) -> Result<Outcome>>;
-
-struct Case {
-    group: &'static str,
-    name: String,
-    condition_is: &'static str,
-    source: &'static str,
-    run: Run,
-}
-
-fn case(
-    group: &'static str,
-    name: impl Into<String>,
-    condition_is: &'static str,
-    source: &'static str,
-    run: impl Fn(&Path) -> Result<Outcome> + 'static,
-) -> Case {
-    Case { group, name: name.into(), condition_is, source, run: Box::new(run) }
-}
 
 /// Runs all cases; `folder` holds their data while they run. `progress` gets the cases done and their count.
 pub fn run(folder: &Path, mut progress: impl FnMut(usize, usize)) -> Vec<Verdict> {

@@ -1,6 +1,6 @@
 //! Sparse coding: nearly parallel atoms, samples of zeros, dead atoms.
 
-use super::{Case, Outcome, case};
+use super::case::{Case, Outcome, case};
 use crate::math::ksvd::{Code, Pursuit, Rows, code_all, dot, gram, iterate, normalise, pursue};
 use crate::math::random::Random;
 

@@ -1,7 +1,7 @@
 //! Bilinear and barycentric weights: none is negative, and they sum to one exactly (chapters 5 and 6).
 
+use super::case::{Case, Outcome, case};
 use super::files::{direction, opened, small_file, upward, weight_defect};
-use super::{Case, Outcome, case};
 use crate::data::directions;
 use crate::format::query::query;
 use crate::math::random::Random;

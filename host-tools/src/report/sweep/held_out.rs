@@ -1,11 +1,12 @@
 //! Directions held out: methods that did not see some of them, measured at those.
 
-use super::swept::{Made, Memory, Visitor, everything};
-use super::{Keys, finder, known, locator};
+use super::groups::everything;
+use super::keys::{Keys, finder, known, locator};
+use super::swept::{Made, Memory, Visitor};
 use crate::data::dataset::{Dataset, Description, Writer};
 use crate::error::{Result, ToolError};
 use crate::measure::verify::open_made;
-use crate::report::HeldOut;
+use crate::report::line::HeldOut;
 use crate::report::store::Store;
 use std::path::Path;
 

@@ -1,149 +1,36 @@
 //! The sweep: every method at every budget, made, measured and kept.
 
 mod baselines;
+mod groups;
 mod held_out;
+mod keys;
 mod methods;
 mod swept;
 
-pub(super) use swept::colour_of;
+pub(super) use groups::colour_of;
+pub use keys::Asked;
+pub(super) use keys::prefix_of;
 
 use super::bench::Bench;
+use super::line::{HeldOut, Kind, Line, Request};
 use super::store::Store;
-use super::{HeldOut, Kind, Line, REVISION, Request};
 use crate::data::dataset::Dataset;
-use crate::data::transfer::Domain;
-use crate::data::transfer::transfer_of;
 use crate::error::Result;
 use crate::files;
-use crate::measure::baseline::decoder::Locator;
 use crate::measure::speed::{self, Adapter};
 use crate::measure::verify::open_made;
-use crate::methods::sparse_ensemble::encode::{self, prepare};
 use crate::progress::Progress;
 use baselines::UNCOMPRESSED;
+use groups::everything;
 use held_out::HoldOut;
-use std::cell::RefCell;
-use std::collections::BTreeSet;
+use keys::{Keys, REFERENCE, finder, known, locator, slug};
 use std::path::Path;
 use std::time::Instant;
-use swept::{Made, Memory, Visitor, What, everything};
-
-/// Something that locates directions: a small file of the same sets.
-///
-/// # Errors
-/// If the data cannot be read.
-fn finder(data: &Dataset) -> Result<Vec<u8>> {
-    let prepared = prepare(vec![data], transfer_of(data, Domain::Log), &|_, _| ())?;
-    let options = encode::Options {
-        edge: 8,
-        criterion: encode::Criterion::Coefficients([1; 3]),
-        ..encode::Options::default()
-    };
-    Ok(encode::encode(&prepared, &prepared.own_ensembles(8), &options, &|_, _| ())?.bytes)
-}
-
-fn locator<'a>(file: &'a selvedge::Selvedge<'a>, data: &Dataset) -> Locator<'a> {
-    let description = data.description();
-    Locator {
-        file,
-        size: description.size,
-        lights: description.lights.clone(),
-        views: description.views.clone(),
-    }
-}
-
-/// Methods and budgets that were asked for, by their keys: what a page shows.
-pub type Asked = BTreeSet<String>;
-
-/// The first 16 hexadecimal digits of the SHA-256 of a text, for names of files.
-fn short_hash(text: &str) -> String {
-    selvedge::sha256(text.as_bytes())[..8].iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
-/// A name that can be a file's.
-fn slug(text: &str) -> String {
-    text.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' }).collect()
-}
+use swept::{Made, Memory, Visitor, What};
 
 /// Budgets of a dataset in bytes.
 fn budgets(data: &Dataset, ratios: &[f64]) -> Vec<u64> {
     ratios.iter().map(|ratio| (data.description().half_bytes() as f64 / ratio) as u64).collect()
-}
-
-/// End of the name of the picture of a dataset, after the prefix of all of its names of files.
-pub(super) const REFERENCE: &str = "-data";
-
-/// A dataset in the stores: what its lines and files are found by.
-struct Keys<'a> {
-    request: &'a Request,
-    /// Name of the dataset.
-    name: String,
-    /// Its name, extent and statistics.
-    identity: String,
-    /// Name of the adapter of the kernel.
-    adapter: &'a str,
-    /// Cores of the rates of all cores.
-    cores: usize,
-    /// Keys of all that was asked for.
-    asked: RefCell<Asked>,
-}
-
-impl<'a> Keys<'a> {
-    fn new(request: &'a Request, data: &Dataset, adapter: &'a str) -> Keys<'a> {
-        let (description, statistics) = (data.description(), data.statistics());
-        let name = data.path().file_stem().map_or("data".into(), |name| name.to_string_lossy().into_owned());
-        let [width, height] = description.size;
-        let mean = statistics.mean.map(f64::to_bits);
-        let largest = statistics.largest.to_bits();
-        let identity = format!(
-            "{name} {width}x{height}x{}x{} {mean:x?} {largest:x}",
-            description.lights.len(),
-            description.views.len()
-        );
-        let cores = rayon::current_num_threads();
-        Keys { request, name, identity, adapter, cores, asked: RefCell::default() }
-    }
-
-    /// The key of a line.
-    fn key(&self, method: &str, budget: u64) -> String {
-        let Keys { request, identity, adapter, cores, .. } = self;
-        let version = env!("CARGO_PKG_VERSION");
-        format!(
-            "{identity} | {method} | {budget} | {} | {:?} | {cores} | {adapter} | {version} {REVISION}",
-            request.rank, request.every
-        )
-    }
-
-    /// Whether a line is asked for, which is kept, and not among the known ones.
-    fn is_wanted(&self, known: &BTreeSet<String>, method: &str, budget: u64) -> bool {
-        let methods = &self.request.methods;
-        if !methods.is_empty() && !methods.iter().any(|part| method.contains(part.as_str())) {
-            return false;
-        }
-        let key = self.key(method, budget);
-        let is_new = !known.contains(&key);
-        self.asked.borrow_mut().insert(key);
-        is_new
-    }
-
-    /// Start of the names of files and pictures: readable, and of this dataset alone. A folder that has the
-    /// dataset keeps what it began with, so that its lines stay together.
-    fn prefix(&self, lines: &Store<Line>) -> String {
-        let start = format!("{} | ", self.identity);
-        let known = lines.lines.iter().find(|line| line.key.starts_with(&start));
-        let prefix = known.and_then(|line| prefix_of(&line.reference)).map(str::to_owned);
-        prefix.unwrap_or_else(|| format!("{}-{}", slug(&self.name), short_hash(&self.identity)))
-    }
-}
-
-/// The prefix of a dataset's names of files, from that of its picture.
-pub(super) fn prefix_of(reference: &str) -> Option<&str> {
-    reference.strip_suffix(".png")?.strip_suffix(REFERENCE)
-}
-
-/// Keys of the lines of a store.
-fn known<T: super::store::Keyed>(store: &Store<T>) -> BTreeSet<String> {
-    store.lines.iter().map(|line| line.key().to_owned()).collect()
 }
 
 /// Measures what a sweep makes of a dataset, and keeps it.
@@ -249,21 +136,5 @@ pub fn teller(quiet: bool) -> impl Fn(&str) {
         if !quiet {
             eprintln!("{:6.0} s  {text}", start.elapsed().as_secs_f64());
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_of_files_do_not_depend_on_the_compiler() {
-        // SHA-256 of "abc", FIPS 180-4.
-        assert_eq!(short_hash("abc"), "ba7816bf8f01cfea");
-        assert_eq!(
-            prefix_of(&format!("cloth-{}{REFERENCE}.png", short_hash("abc"))),
-            Some("cloth-ba7816bf8f01cfea")
-        );
-        assert_eq!(prefix_of("cloth.png"), None);
     }
 }

@@ -56,6 +56,9 @@ impl SparseEnsemble {
     }
 }
 
+/// The encoder with default options.
+pub static ENCODER: SparseEnsemble = SparseEnsemble::DEFAULT;
+
 impl Encoder for SparseEnsemble {
     fn method(&self) -> &'static str {
         NAME

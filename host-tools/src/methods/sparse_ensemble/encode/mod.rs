@@ -24,6 +24,3 @@ pub mod verified;
 pub use options::{Criterion, Encoded, Options};
 pub use prepare::{Prepared, prepare};
 pub use threshold::encode;
-
-/// The encoder with default options.
-pub static ENCODER: settings::SparseEnsemble = settings::SparseEnsemble::DEFAULT;

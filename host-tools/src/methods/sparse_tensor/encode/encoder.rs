@@ -73,6 +73,9 @@ impl AsRef<[u8]> for Shaped {
     }
 }
 
+/// The encoder with default options.
+pub static ENCODER: SparseTensor = SparseTensor::DEFAULT;
+
 impl Encoder for SparseTensor {
     fn method(&self) -> &'static str {
         NAME

@@ -21,9 +21,6 @@ pub use coder::{encode, encode_fit};
 pub use options::{Encoded, Options};
 pub use shapes::ShapeSearch;
 
-/// The encoder with default options.
-pub static ENCODER: options::SparseTensor = options::SparseTensor::DEFAULT;
-
 #[cfg(test)]
 mod tests {
     use super::fit::{Shape, Training};
